@@ -1,0 +1,48 @@
+// A glTF 2.0 file that has been read and validated: after load() succeeds, every index, size, type
+// and value that later stages use is known to be in range.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "backend/gltf/tinygltf.h"
+#include "backend/util/limits.h"
+#include "backend/util/result.h"
+
+namespace octrace::gltf {
+
+// An image as it lies in the file, not decoded; its header has been checked.
+struct EncodedImage {
+  std::vector<std::uint8_t> bytes;  // empty: missing, and LoadOptions said to go on
+  std::string mime;                 // image/png, image/jpeg or image/webp, by content
+  std::string pointer;              // "/images/3"
+  std::string uri;                  // as the file names it; empty where embedded
+};
+
+struct Document {
+  tinygltf::Model model;            // structure only: its images hold no pixels
+  std::vector<EncodedImage> images;
+  std::string file;                 // as the user named it
+  std::vector<std::string> warnings;
+
+  // Element counts come from model.accessors[i].count.
+  // Components as float, normalised integers mapped to [0,1] or [-1,1], sparse values applied,
+  // strides followed: count * components numbers, in order.
+  std::vector<float> read_floats(int accessor) const;
+  // Unsigned integer scalars or vectors (indices, joints), sparse values applied.
+  std::vector<std::uint32_t> read_uints(int accessor) const;
+};
+
+struct LoadOptions {
+  util::Limits limits;
+  bool missing_images_warn = false;
+};
+
+util::Result<Document> load(const std::string& path, const LoadOptions& options);
+
+// Extensions whose meaning octrace follows; others in extensionsRequired are refused.
+std::span<const std::string_view> supported_extensions();
+
+}  // namespace octrace::gltf

@@ -1,0 +1,72 @@
+// Reading and writing image files. The library behind it (OpenImageIO) loads when first needed, on
+// whatever thread calls preload(), because its shared libraries take longer to load than many scenes
+// take to render.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "backend/util/limits.h"
+#include "backend/util/result.h"
+
+namespace octrace::image {
+
+enum class SampleType { float32, uint32 };
+
+// One channel of an image in memory: sample (x, y) lies at data + (y * width + x) * stride bytes.
+struct Channel {
+  std::string name;
+  SampleType type = SampleType::float32;
+  const void* data = nullptr;
+  std::size_t stride = 4;
+};
+
+struct ImageView {
+  std::uint32_t width = 0, height = 0;
+  std::vector<Channel> channels;
+  std::vector<std::pair<std::string, std::string>> metadata;
+};
+
+// A file as read: channels in file order, each converted to float32 or uint32.
+struct Image {
+  std::uint32_t width = 0, height = 0;
+  struct Plane {
+    std::string name;
+    SampleType type = SampleType::float32;
+    std::vector<float> floats;          // float32
+    std::vector<std::uint32_t> uints;   // uint32
+  };
+  std::vector<Plane> planes;
+  std::vector<std::pair<std::string, std::string>> metadata;
+  const Plane* find(const std::string& name) const;
+};
+
+// How samples become the integers of a PNG, TIFF or JPEG.
+enum class Encoding {
+  srgb8,     // beauty, albedo: linear to sRGB; alpha unassociated in PNG
+  linear8,   // mask
+  signed8,   // normals: [-1, 1] to [0, 255]
+  scaled16,  // depth: round(value * scale), 65535 where it does not fit or nothing was hit
+  index16,   // ids: as they are; an error where one exceeds 65535
+};
+
+void preload();  // starts loading the image library in the background; optional
+
+// Every writer: the file is whole or absent (temporary name in the same folder, flushed, renamed).
+util::Result<void> write_exr(const std::string& path, const ImageView& image);
+util::Result<void> write_integer(const std::string& path, const ImageView& image, Encoding encoding,
+                                 double scale);
+util::Result<Image> read(const std::string& path, const util::Limits& limits);
+
+// RGBA8 from a PNG, JPEG or WebP in memory; rows from the top, alpha as stored (unassociated).
+struct Rgba8 {
+  std::uint32_t width = 0, height = 0;
+  std::vector<std::uint32_t> texels;
+};
+util::Result<Rgba8> decode(std::span<const std::uint8_t> bytes, const std::string& mime,
+                           const util::Limits& limits);
+
+}  // namespace octrace::image

@@ -1,0 +1,63 @@
+// Builds the octree over a scene's triangles.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "backend/scene/scene.h"
+#include "backend/util/result.h"
+#include "kernels/node.h"
+
+namespace octrace::octree {
+
+enum class Builder { median, sah };
+
+struct BuildOptions {
+  Builder builder = Builder::sah;
+  std::uint32_t leaf = 0;   // median: most vertices in a leaf (0: 8); sah: most triangles (0: 3)
+  unsigned threads = 0;     // 0: all
+  std::uint64_t max_bytes = 64ull << 30;  // --max-scene-bytes
+};
+
+struct Statistics {
+  std::uint64_t nodes = 0;
+  std::uint64_t leaves = 0;         // child slots that hold triangles
+  std::uint64_t triangles = 0;
+  std::uint32_t depth = 0;          // nodes on the longest path from the root
+  std::uint64_t bytes = 0;          // nodes and leaf triangles
+  double children_per_node = 0.0;
+  double triangles_per_leaf = 0.0;
+  double sah_cost = 0.0;            // expected node and triangle tests of a random ray
+};
+
+struct Octree {
+  std::vector<kernels::Node> nodes;
+  std::vector<kernels::LeafTriangle> triangles;
+
+  kernels::OctreeView view() const {
+    return {{nodes.data(), nodes.size()}, {triangles.data(), triangles.size()}};
+  }
+};
+
+// flags: kCullBack and so on of each triangle; the leaf triangle's geometry field comes from
+// triangle_geometry. Both may be empty (0). Errors: exit 6 where max_bytes would be passed.
+struct BuildInput {
+  std::span<const kernels::Vec3> positions;
+  std::span<const kernels::Triangle> triangles;
+  std::span<const std::uint32_t> triangle_geometry;
+  std::span<const std::uint32_t> flags;  // by geometry
+};
+
+util::Result<Octree> build(const BuildInput& input, const BuildOptions& options);
+util::Result<Octree> build(const scene::Scene& scene, const BuildOptions& options);
+
+// Checks every invariant: child boxes hold their triangles and their children's boxes, every
+// triangle lies in exactly one leaf, indices are in range, depth is within kMaxDepth. Exit 7.
+util::Result<void> verify(const Octree& octree, const BuildInput& input);
+util::Result<void> verify(const Octree& octree, const scene::Scene& scene);
+
+Statistics statistics(const Octree& octree);
+
+}  // namespace octrace::octree

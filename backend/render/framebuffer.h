@@ -1,0 +1,46 @@
+// The named planes of one rendered image, in host memory.
+#pragma once
+
+#include <array>
+#include <bitset>
+#include <cstdint>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "kernels/aov.h"
+
+namespace octrace::render {
+
+using kernels::Aov;
+using AovSet = std::bitset<kernels::kAovCount>;
+
+struct AovInfo {
+  Aov aov;
+  std::string_view option;                    // as --aov names it: "depth" also answers to "Z"
+  std::array<std::string_view, 4> channels;   // as the EXR names them
+  int channel_count;
+  bool uint32;
+  std::string_view description;
+};
+
+std::span<const AovInfo> aov_table();  // by Aov's order
+const AovInfo& aov_info(Aov aov);
+
+class Framebuffer {
+ public:
+  Framebuffer(std::uint32_t width, std::uint32_t height, AovSet aovs);
+  std::uint32_t width() const { return width_; }
+  std::uint32_t height() const { return height_; }
+  AovSet aovs() const { return aovs_; }
+  std::span<const float> floats(Aov aov) const;
+  std::span<const std::uint32_t> uints(Aov aov) const;
+  kernels::FramebufferView view();
+
+ private:
+  std::uint32_t width_, height_;
+  AovSet aovs_;
+  std::array<std::vector<std::uint32_t>, kernels::kAovCount> planes_;  // bits of float or uint32
+};
+
+}  // namespace octrace::render

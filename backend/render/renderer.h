@@ -1,0 +1,44 @@
+// Traces one view of a scene into a framebuffer, on some device.
+#pragma once
+
+#include <atomic>
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "backend/octree/octree.h"
+#include "backend/render/framebuffer.h"
+#include "backend/scene/scene.h"
+#include "kernels/camera.h"
+#include "kernels/render_params.h"
+
+namespace octrace::render {
+
+struct Settings {
+  kernels::RenderParams params;
+  unsigned threads = 0;     // 0: all
+  std::uint32_t tile = 16;  // pixels a side; never changes the image
+  // Called now and then from one thread at a time with the share of pixels done, 0 to 1.
+  std::function<void(double)> progress;
+  const std::atomic<bool>* cancel = nullptr;
+};
+
+struct TraceStats {
+  std::uint64_t camera_rays = 0;  // geometry AOVs
+  std::uint64_t beauty_rays = 0;  // camera, transparency and sky rays of beauty
+  std::uint64_t shadow_rays = 0;
+  double seconds = 0.0;
+  std::string device;             // "cpu: AMD EPYC 9654, 2 threads, AVX2"
+};
+
+class Renderer {
+ public:
+  virtual ~Renderer() = default;
+  virtual util::Result<TraceStats> render(const kernels::RayCamera& camera, const Settings& settings,
+                                          Framebuffer& framebuffer) = 0;
+};
+
+// The scene and the octree must outlive the renderer.
+std::unique_ptr<Renderer> make_cpu_renderer(const scene::Scene& scene, const octree::Octree& octree);
+
+}  // namespace octrace::render

@@ -1,0 +1,103 @@
+#include "backend/util/atomic_file.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <stdlib.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+
+namespace octrace::util {
+
+namespace {
+
+Error io_error(const std::string& file, std::string_view what, int error_number) {
+  return {Exit::io, "IO_ERROR", fmt::format("{}: {}", what, std::strerror(error_number)), file, ""};
+}
+
+bool write_all(int descriptor, std::string_view content) {
+  while (!content.empty()) {
+    const ssize_t written = ::write(descriptor, content.data(), content.size());
+    if (written < 0) {
+      if (errno == EINTR) continue;
+      return false;
+    }
+    content.remove_prefix(static_cast<std::size_t>(written));
+  }
+  return true;
+}
+
+mode_t process_umask() {
+  const mode_t mask = ::umask(0);
+  ::umask(mask);
+  return mask;
+}
+
+}  // namespace
+
+Result<AtomicFile> AtomicFile::create(const std::string& target) {
+  const std::filesystem::path path(target);
+  if (path.filename().empty()) {
+    return Error{Exit::io, "IO_ERROR", "is a folder, a file name was needed", target, ""};
+  }
+  std::error_code ignored;
+  if (std::filesystem::is_directory(path, ignored)) {
+    return Error{Exit::io, "IO_ERROR", "is a folder, a file name was needed", target, ""};
+  }
+  // The leading dot hides it from patterns such as *.exr; mkstemps fills in the Xs.
+  const std::string extension = path.extension().string();
+  std::string temporary =
+      (path.parent_path() / ("." + path.stem().string() + ".XXXXXX" + extension)).string();
+  const int descriptor = ::mkstemps(temporary.data(), static_cast<int>(extension.size()));
+  if (descriptor < 0) return io_error(target, "cannot be created", errno);
+  ::fchmod(descriptor, 0666 & ~process_umask());  // mkstemps makes 0600
+  ::close(descriptor);
+  return AtomicFile(target, std::move(temporary));
+}
+
+AtomicFile::AtomicFile(AtomicFile&& other) noexcept
+    : target_(std::move(other.target_)), temporary_(std::exchange(other.temporary_, {})) {}
+
+AtomicFile::~AtomicFile() {
+  if (!temporary_.empty()) ::unlink(temporary_.c_str());
+}
+
+Result<void> AtomicFile::commit() {
+  const int descriptor = ::open(temporary_.c_str(), O_RDONLY | O_CLOEXEC);
+  if (descriptor < 0) return io_error(target_, "cannot be reopened", errno);
+  const int flushed = ::fsync(descriptor);
+  const int error_number = errno;
+  ::close(descriptor);
+  if (flushed != 0) return io_error(target_, "cannot be flushed", error_number);
+  if (::rename(temporary_.c_str(), target_.c_str()) != 0) {
+    return io_error(target_, "cannot be renamed into place", errno);
+  }
+  temporary_.clear();
+  // The rename itself survives a power cut only when the folder is flushed too.
+  std::filesystem::path folder = std::filesystem::path(target_).parent_path();
+  if (folder.empty()) folder = ".";
+  const int folder_descriptor = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (folder_descriptor >= 0) {
+    ::fsync(folder_descriptor);
+    ::close(folder_descriptor);
+  }
+  return {};
+}
+
+Result<void> write_file(const std::string& target, std::string_view content) {
+  Result<AtomicFile> file = AtomicFile::create(target);
+  if (!file) return file.error();
+  const int descriptor = ::open(file->temporary().c_str(), O_WRONLY | O_TRUNC | O_CLOEXEC);
+  if (descriptor < 0) return io_error(target, "cannot be opened", errno);
+  const bool written = write_all(descriptor, content);
+  const int error_number = errno;
+  const bool closed = ::close(descriptor) == 0;
+  if (!written || !closed) return io_error(target, "cannot be written", error_number);
+  return file->commit();
+}
+
+}  // namespace octrace::util

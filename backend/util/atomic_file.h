@@ -1,0 +1,32 @@
+// Output that is whole or absent: write to a temporary name beside the target, flush, rename.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "backend/util/result.h"
+
+namespace octrace::util {
+
+// A temporary file in the target's folder. Unless commit() succeeds, the destructor removes it.
+class AtomicFile {
+ public:
+  // Errors (exit 5) where the folder does not exist or cannot be written to.
+  static Result<AtomicFile> create(const std::string& target);
+  AtomicFile(AtomicFile&& other) noexcept;
+  AtomicFile& operator=(AtomicFile&&) = delete;
+  ~AtomicFile();
+
+  // Keeps the target's extension, because image writers choose their format by it.
+  const std::string& temporary() const { return temporary_; }
+  Result<void> commit();  // fsync, rename, fsync of the folder
+
+ private:
+  AtomicFile(std::string target, std::string temporary)
+      : target_(std::move(target)), temporary_(std::move(temporary)) {}
+  std::string target_, temporary_;
+};
+
+Result<void> write_file(const std::string& target, std::string_view content);
+
+}  // namespace octrace::util

@@ -1,0 +1,39 @@
+// The planes that a render can fill, and the record through which kernels write them.
+#pragma once
+
+#include "kernels/config.h"
+
+namespace octrace::kernels {
+
+// In the order in which they are written to a file.
+enum class Aov : int {
+  beauty,            // 4 floats: R G B A, linear, premultiplied
+  depth,             // 1: Z, planar depth along the camera's axis; +inf where nothing is hit
+  distance,          // 1: Euclidean from the camera's centre (orthographic: as Z); +inf
+  normal,            // 3: shading normal, world, facing the viewer; 0
+  geometric_normal,  // 3: of the flat triangle, world, facing the viewer; 0
+  position,          // 3: world; 0
+  albedo,            // 3: linear base colour; 0
+  uv,                // 2: first texture coordinate set; 0
+  barycentric,       // 2: weights of the second and third corner; 0
+  object_id,         // uint32: node index + 1; 0
+  material_id,       // uint32: material index + 1; 0
+  primitive_id,      // uint32: triangle index + 1; 0
+  mask,              // 1: 1 where something is hit, else 0
+};
+inline constexpr int kAovCount = 13;
+
+// float or uint32 values, channels interleaved, rows from the top; null: not asked for.
+struct FramebufferView {
+  void* planes[kAovCount] = {};
+  std::uint32_t width = 0, height = 0;
+
+  OCTRACE_HD float* floats(Aov aov) const {
+    return static_cast<float*>(planes[static_cast<int>(aov)]);
+  }
+  OCTRACE_HD std::uint32_t* uints(Aov aov) const {
+    return static_cast<std::uint32_t*>(planes[static_cast<int>(aov)]);
+  }
+};
+
+}  // namespace octrace::kernels
