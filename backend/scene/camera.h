@@ -6,6 +6,7 @@
 #include <string>
 
 #include <glm/mat4x4.hpp>
+#include <glm/vec3.hpp>
 
 #include "backend/util/result.h"
 #include "kernels/camera.h"
@@ -19,18 +20,20 @@ enum class CameraType { perspective, orthographic, pinhole };
 struct Camera {
   std::string name;
   CameraType type = CameraType::perspective;
-  glm::dmat4 matrix{1.0};  // camera to world; scale is removed, as renderers do
-  double yfov = 0.8;       // perspective: radians
+  glm::dmat4 matrix{1.0};         // camera to world; scale is removed, as renderers do
+  double yfov = 0.8;              // perspective: radians
   double xmag = 1.0, ymag = 1.0;  // orthographic: half of what the view spans; xmag is ignored
-  // pinhole: pixels, from the image's top left corner (the first pixel's centre is 0.5, 0.5), for an
-  // image of width x height pixels; 0: for whatever size is rendered
+  // pinhole: pixels, from the image's top left corner (the first pixel's centre is 0.5, 0.5), for
+  // an image of width x height pixels; 0: for whatever size is rendered
   double fx = 0, fy = 0, cx = 0, cy = 0;
   double width = 0, height = 0;
   double znear = 0.0;
   double zfar = std::numeric_limits<double>::infinity();
 };
 
-// Rays for an image of width x height pixels. Computed in double and rounded once.
+// Rays for an image of width x height pixels. Computed in double and rounded once. A mirrored
+// matrix gives a mirrored image, a degenerate one some perpendicular axis; the viewing axis is
+// kept.
 kernels::RayCamera make_ray_camera(const Camera& camera, int width, int height);
 
 // The file of --camera FILE.json: {"type": "perspective", "yfov": 0.7, "matrix": [16 numbers]},
@@ -39,7 +42,11 @@ kernels::RayCamera make_ray_camera(const Camera& camera, int width, int height);
 util::Result<Camera> read_camera_file(const std::string& path);
 
 struct Bounds;
-// A camera that sees the whole bounds from the front, above and the right.
+// A camera at eye that looks at target, +Y up; the two must not lie above each other.
+Camera look_at(const glm::dvec3& eye, const glm::dvec3& target, double yfov);
+
+// A camera that sees the whole bounds from the front, above and the right, from outside; where they
+// are empty, one that frames a unit cube at the origin.
 Camera frame_bounds(const Bounds& bounds, double aspect);
 
 }  // namespace octrace::scene

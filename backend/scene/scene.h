@@ -38,12 +38,14 @@ struct Scene {
   std::vector<std::string> object_names;    // by object index (glTF node index)
   std::vector<std::string> material_names;  // by material index
   Bounds bounds;
-  std::vector<std::string> warnings;        // one line each, no duplicates
+  std::vector<std::string> warnings;  // one line each, no duplicates
 
   // Host view; octree is left empty for the caller to fill. Valid while the scene is unchanged.
   kernels::SceneView view() const;
   std::uint64_t bytes() const;
 };
+
+Bounds bounds_of(const std::vector<kernels::Vec3>& positions);
 
 // Beyond this the triangle test's products leave the range of float.
 inline constexpr float kMaxCoordinate = 1e9f;
