@@ -1,6 +1,6 @@
 // Reading and writing image files. The library behind it (OpenImageIO) loads when first needed, on
-// whatever thread calls preload(), because its shared libraries take longer to load than many scenes
-// take to render.
+// whatever thread calls preload(), because its shared libraries take longer to load than many
+// scenes take to render.
 #pragma once
 
 #include <cstdint>
@@ -36,8 +36,8 @@ struct Image {
   struct Plane {
     std::string name;
     SampleType type = SampleType::float32;
-    std::vector<float> floats;          // float32
-    std::vector<std::uint32_t> uints;   // uint32
+    std::vector<float> floats;         // float32
+    std::vector<std::uint32_t> uints;  // uint32
   };
   std::vector<Plane> planes;
   std::vector<std::pair<std::string, std::string>> metadata;
@@ -54,6 +54,8 @@ enum class Encoding {
 };
 
 void preload();  // starts loading the image library in the background; optional
+// The library's own threads, which compress and decompress (0: all cores). Waits for its loading.
+util::Result<void> set_threads(unsigned threads);
 
 // Every writer: the file is whole or absent (temporary name in the same folder, flushed, renamed).
 util::Result<void> write_exr(const std::string& path, const ImageView& image);

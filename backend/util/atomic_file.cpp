@@ -51,7 +51,7 @@ Result<AtomicFile> AtomicFile::create(const std::string& target) {
   // The leading dot hides it from patterns such as *.exr; mkstemps fills in the Xs.
   const std::string extension = path.extension().string();
   std::string temporary =
-      (path.parent_path() / ("." + path.stem().string() + ".XXXXXX" + extension)).string();
+      (path.parent_path() / fmt::format(".{}.XXXXXX{}", path.stem().string(), extension)).string();
   const int descriptor = ::mkstemps(temporary.data(), static_cast<int>(extension.size()));
   if (descriptor < 0) return io_error(target, "cannot be created", errno);
   ::fchmod(descriptor, 0666 & ~process_umask());  // mkstemps makes 0600

@@ -1,0 +1,8 @@
+// Which octrace this is.
+#pragma once
+
+namespace octrace::util {
+
+const char* version();  // "0.1.0"
+
+}  // namespace octrace::util
