@@ -10,7 +10,7 @@
 
 namespace octrace::validation {
 
-// Rows from the top. A plane that the image does not have is empty; `mask` never is.
+// Rows from the top. A plane that the image does not have is empty; mask is there wherever z is.
 struct Planes {
   std::uint32_t width = 0, height = 0;
   std::vector<std::uint8_t> mask;        // 1: something was hit
@@ -22,12 +22,14 @@ struct Planes {
 
 // Recognises the channels of octrace (Z, mask, A, object_id), Blender's multilayer OpenEXR
 // (ViewLayer.Depth.Z with 1e10 behind everything, ViewLayer.Combined.RGBA, ViewLayer.IndexOB.X) and
-// plain OpenEXR (Z or depth, A or mask, R G B). Errors (exit 3) name the channels that are there:
-// an empty image, neither depth nor mask nor alpha, NaN in a plane that is compared.
+// plain OpenEXR (Z or depth, A or mask, R G B). The mask comes from `mask`, else alpha, else where
+// Z is finite. Errors (exit 3): an empty image, no channel that is known (those that are there are
+// named), NaN in a plane that is compared.
 util::Result<Planes> planes_from_image(const image::Image& image, const std::string& file);
 
 // exporters/povray's depth encoding in a 16-bit RGB PNG. With r, g, b the 16-bit samples:
-//   q = (r >> 1) << 15 | (g >> 1)     30 bits, q = floor(clamp(planar / far_distance) * 2^30 + 0.5),
+//   q = (r >> 1) << 15 | (g >> 1)     30 bits, q = floor(clamp(planar / far_distance) * 2^30 +
+//   0.5),
 //                                     held below 2^30
 //   b = object id (glTF node index + 1), 0 where nothing was hit
 // far_distance: in the scene's units, so that whatever scaling the export did cancels out.

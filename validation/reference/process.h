@@ -1,6 +1,7 @@
 // Runs another program without a shell, under a time limit, with its output in a file.
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <string>
 #include <vector>
@@ -14,11 +15,13 @@ struct Command {
   std::string folder;                  // working directory; empty: the caller's
   std::string log;                     // file that receives standard output and standard error
   std::chrono::milliseconds timeout{120000};
+  const std::atomic<bool>* cancel = nullptr;  // kills the program when it becomes true
 };
 
 struct ProcessResult {
-  int exit_code = 0;   // 128 + N: killed by signal N, as shells say it
+  int exit_code = 0;  // 128 + N: killed by signal N, as shells say it
   bool timed_out = false;
+  bool cancelled = false;
   double seconds = 0.0;
 };
 
