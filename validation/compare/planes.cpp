@@ -17,6 +17,7 @@ using Plane = image::Image::Plane;
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 // Blender writes 1e10 behind everything; no scene reaches it (scene::kMaxCoordinate is 1e9).
+constexpr std::uint32_t kHalf = 1u << 15;  // POV-Ray: the depth is in two halves of 15 bits
 constexpr float kBackground = 9.9e9f;
 
 std::string lower(std::string text) {
@@ -174,12 +175,18 @@ Result<Planes> planes_from_povray(const image::Image& image, double far_distance
   planes.mask.resize(pixels);
   planes.z.assign(pixels, kInfinity);
   planes.object_id.resize(pixels);
-  const double unit = far_distance / (1u << 30);
+  const double unit = far_distance / (double{kHalf} * kHalf);
   for (std::size_t i = 0; i < pixels; ++i) {
     planes.object_id[i] = integer(2, i);
     planes.mask[i] = planes.object_id[i] != 0;
     if (!planes.mask[i]) continue;
-    const std::uint32_t q = (integer(0, i) >> 1) << 15 | integer(1, i) >> 1;
+    const std::uint32_t high = integer(0, i), low = integer(1, i);
+    if (high >= kHalf || low >= kHalf) {
+      return invalid(file, fmt::format("pixel ({}, {}) holds {} and {}, and an encoded depth stays "
+                                       "below {}: was the image written with a gamma?",
+                                       i % image.width, i / image.width, high, low, kHalf));
+    }
+    const double q = double(high) * kHalf + double(low);
     planes.z[i] = static_cast<float>(q * unit);
   }
   return planes;

@@ -27,12 +27,11 @@ struct Planes {
 // named), NaN in a plane that is compared.
 util::Result<Planes> planes_from_image(const image::Image& image, const std::string& file);
 
-// exporters/povray's depth encoding in a 16-bit RGB PNG. With r, g, b the 16-bit samples:
-//   q = (r >> 1) << 15 | (g >> 1)     30 bits, q = floor(clamp(planar / far_distance) * 2^30 +
-//   0.5),
-//                                     held below 2^30
-//   b = object id (glTF node index + 1), 0 where nothing was hit
-// far_distance: in the scene's units, so that whatever scaling the export did cancels out.
+// exporters/povray's depth encoding, a 16-bit RGB PNG. With R, G, B the 16-bit integers:
+//   B      object id (glTF node index + 1); 0 where nothing was hit
+//   depth  (R * 32768 + G) * far_distance / 2^30, R and G below 32768
+// far_distance: in the scene's units, so that whatever scaling the export did cancels out. Errors
+// (exit 3): another kind of image, a value that the encoding cannot have made.
 util::Result<Planes> planes_from_povray(const image::Image& image, double far_distance,
                                         const std::string& file);
 

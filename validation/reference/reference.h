@@ -10,7 +10,6 @@
 #include <chrono>
 #include <cstdint>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "backend/util/limits.h"
@@ -27,26 +26,30 @@ struct ProgramOptions {
   const std::atomic<bool>* cancel = nullptr;
 };
 
-// One .pov of `--mode depth`, encoded as planes_from_povray describes.
+// One .pov in depth mode; fields as exporters::PovrayFile has them.
 struct PovrayJob {
-  std::string scene;  // path of the .pov
+  std::string folder;                  // where the .pov lies, and the working directory
+  std::vector<std::string> arguments;  // after the program's name
+  std::string image;                   // the PNG that they make, in the folder
   std::uint32_t width = 0, height = 0;
-  double far_distance = 0.0;  // planar depth, scene units, that q = 2^30 would stand for
+  double far_distance = 0.0;  // planar depth, scene units, that the encoding's 2^30 stands for
 };
 util::Result<Planes> run_povray(const PovrayJob& job, const ProgramOptions& options);
 
 // One Python script that renders any number of views in one process, because Blender takes two
-// seconds to start. The script must write outputs[i] for view i (OpenEXR multilayer, channels as in
-// planes_from_image; object id as pass index where it knows the glTF node), must go on with the
-// next view when one fails, printing a line "octrace: view I: reason", and must then end by an
-// exception, which --python-exit-code turns into a non-zero exit.
-struct BlenderJob {
-  std::string script;                // path of the .py
-  std::vector<std::string> outputs;  // paths, one a view; deleted before the run
-  std::vector<std::pair<std::uint32_t, std::uint32_t>> sizes;  // expected width and height
+// seconds to start. The script goes on when a view fails and says so in a line "octrace: failed
+// ...", and then ends with an exception.
+struct BlenderView {
+  std::string output;  // path of the OpenEXR; removed before the run
+  std::uint32_t width = 0, height = 0;
 };
-// One result a view: a view that failed does not take the others with it. The outer error is that
-// of a program that is missing (exit 4) or did not start.
+struct BlenderJob {
+  std::string folder;                  // working directory
+  std::vector<std::string> arguments;  // as exporters::blender_arguments has them
+  std::vector<BlenderView> views;
+};
+// One result a view: one that failed does not take the others with it. The outer error is that of a
+// program that is missing (exit 4) or did not start (exit 5).
 util::Result<std::vector<util::Result<Planes>>> run_blender(const BlenderJob& job,
                                                             const ProgramOptions& options);
 
