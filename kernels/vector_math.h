@@ -6,17 +6,14 @@
 #include <cmath>
 
 #include "kernels/config.h"
+#include "kernels/round.h"
 
 namespace octrace::kernels {
 
 inline constexpr float kPi = 3.14159265358979f;
 
-// As ternaries, so that a NaN in `a` becomes `b` on every device.
-OCTRACE_HD inline float min_of(float a, float b) { return a < b ? a : b; }
-OCTRACE_HD inline float max_of(float a, float b) { return a > b ? a : b; }
-OCTRACE_HD inline float clamp01(float x) { return min_of(max_of(x, 0.0f), 1.0f); }
-OCTRACE_HD inline float magnitude(float x) { return x < 0.0f ? -x : x; }
-
+// NaN becomes 0: lesser() and greater() return their second argument then.
+OCTRACE_HD inline float clamp01(float x) { return lesser(greater(x, 0.0f), 1.0f); }
 OCTRACE_HD inline float square_root(float x) { return std::sqrt(x); }
 
 OCTRACE_HD inline float dot(Vec3 a, Vec3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
@@ -24,9 +21,9 @@ OCTRACE_HD inline float dot(Vec2 a, Vec2 b) { return a.x * b.x + a.y * b.y; }
 OCTRACE_HD inline Vec3 cross(Vec3 a, Vec3 b) {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
-OCTRACE_HD inline float largest(Vec3 a) { return max_of(max_of(a.x, a.y), a.z); }
+OCTRACE_HD inline float largest(Vec3 a) { return greater(greater(a.x, a.y), a.z); }
 OCTRACE_HD inline float largest_magnitude(Vec3 a) {
-  return max_of(max_of(magnitude(a.x), magnitude(a.y)), magnitude(a.z));
+  return greater(greater(abs_of(a.x), abs_of(a.y)), abs_of(a.z));
 }
 OCTRACE_HD inline float mean(Vec3 a) { return (a.x + a.y + a.z) * (1.0f / 3.0f); }
 

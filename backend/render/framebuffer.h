@@ -5,9 +5,11 @@
 #include <bitset>
 #include <cstdint>
 #include <span>
+#include <string>
 #include <string_view>
 #include <vector>
 
+#include "backend/util/result.h"
 #include "kernels/aov.h"
 
 namespace octrace::render {
@@ -17,8 +19,9 @@ using AovSet = std::bitset<kernels::kAovCount>;
 
 struct AovInfo {
   Aov aov;
-  std::string_view option;                    // as --aov names it: "depth" also answers to "Z"
-  std::array<std::string_view, 4> channels;   // as the EXR names them
+  std::string_view option;                   // as --aov names it
+  std::string_view alias;                    // its channels' layer, which --aov takes as well
+  std::array<std::string_view, 4> channels;  // as the EXR names them
   int channel_count;
   bool uint32;
   std::string_view description;
@@ -26,6 +29,10 @@ struct AovInfo {
 
 std::span<const AovInfo> aov_table();  // by Aov's order
 const AovInfo& aov_info(Aov aov);
+
+// A comma-separated list of options or aliases in any case, or "all". Exit 2 names what exists.
+util::Result<AovSet> parse_aovs(std::string_view list);
+std::string aov_names();  // "beauty, depth (Z), ..."
 
 class Framebuffer {
  public:

@@ -28,17 +28,18 @@ struct TraceStats {
   std::uint64_t beauty_rays = 0;  // camera, transparency and sky rays of beauty
   std::uint64_t shadow_rays = 0;
   double seconds = 0.0;
-  std::string device;             // "cpu: AMD EPYC 9654, 2 threads, AVX2"
+  std::string device;  // "cpu: AMD EPYC 9654, 2 threads, AVX2"
 };
 
 class Renderer {
  public:
   virtual ~Renderer() = default;
-  virtual util::Result<TraceStats> render(const kernels::RayCamera& camera, const Settings& settings,
-                                          Framebuffer& framebuffer) = 0;
+  virtual util::Result<TraceStats> render(const kernels::RayCamera& camera,
+                                          const Settings& settings, Framebuffer& framebuffer) = 0;
 };
 
 // The scene and the octree must outlive the renderer.
-std::unique_ptr<Renderer> make_cpu_renderer(const scene::Scene& scene, const octree::Octree& octree);
+std::unique_ptr<Renderer> make_cpu_renderer(const scene::Scene& scene,
+                                            const octree::Octree& octree);
 
 }  // namespace octrace::render

@@ -1,0 +1,39 @@
+#include "backend/render/framebuffer.h"
+
+#include <bit>
+
+namespace octrace::render {
+
+Framebuffer::Framebuffer(std::uint32_t width, std::uint32_t height, AovSet aovs)
+    : width_(width), height_(height), aovs_(aovs) {
+  const std::size_t pixels = static_cast<std::size_t>(width) * height;
+  for (const AovInfo& info : aov_table()) {
+    const auto plane = static_cast<std::size_t>(info.aov);
+    if (aovs.test(plane))
+      planes_[plane].resize(pixels * static_cast<std::size_t>(info.channel_count));
+  }
+}
+
+// Planes are allocated as 32-bit words, and kernels fill them as float or uint32 through void*; the
+// two have one size and alignment, and each plane is read as what it was written as.
+std::span<const float> Framebuffer::floats(Aov aov) const {
+  const auto& plane = planes_[static_cast<std::size_t>(aov)];
+  if (aov_info(aov).uint32) return {};
+  return {reinterpret_cast<const float*>(plane.data()), plane.size()};
+}
+
+std::span<const std::uint32_t> Framebuffer::uints(Aov aov) const {
+  if (!aov_info(aov).uint32) return {};
+  return planes_[static_cast<std::size_t>(aov)];
+}
+
+kernels::FramebufferView Framebuffer::view() {
+  kernels::FramebufferView view;
+  view.width = width_;
+  view.height = height_;
+  for (std::size_t i = 0; i < planes_.size(); ++i)
+    view.planes[i] = planes_[i].empty() ? nullptr : planes_[i].data();
+  return view;
+}
+
+}  // namespace octrace::render
