@@ -8,7 +8,8 @@
 namespace octrace::kernels {
 
 inline constexpr int kChildren = 8;
-// The most triangles that one child slot holds, and one node: a leaf of more becomes a small subtree.
+// The most triangles that one child slot holds, and one node: a leaf of more becomes a small
+// subtree.
 inline constexpr int kMaxLeafTriangles = 3;
 inline constexpr int kMaxNodeTriangles = kChildren * kMaxLeafTriangles;
 // Builders stop at this depth (nodes on a path from the root). The traversal pushes at most one
@@ -19,14 +20,13 @@ inline constexpr int kMaxDepth = 32;
 // octant is set when the ray's direction is negative along axis a, goes roughly from near to far.
 //
 // A child's box along axis a is [origin[a] + lower[a][slot] * 2^exponent[a],
-// origin[a] + upper[a][slot] * 2^exponent[a]]; both ends are representable, so the box is exact.
-// Unused slots have lower > upper and meta 0.
+// origin[a] + upper[a][slot] * 2^exponent[a]]. Unused slots have meta 0.
 struct alignas(16) Node {
   float origin[3];
   std::int8_t exponent[3];
-  std::uint8_t inner_mask;      // bit s: slot s is an inner node
-  std::uint32_t first_child;    // inner children lie together, in slot order
-  std::uint32_t first_triangle; // this node's leaf triangles lie together, in slot order
+  std::uint8_t inner_mask;       // bit s: slot s is an inner node
+  std::uint32_t first_child;     // inner children lie together, in slot order
+  std::uint32_t first_triangle;  // this node's leaf triangles lie together, in slot order
   // Leaves: bits 0-4 the offset from first_triangle, bits 5-7 as many ones as it has triangles
   // (001, 011, 111). Inner nodes: 0x20 | (24 + slot), as in the paper.
   std::uint8_t meta[kChildren];
@@ -40,7 +40,7 @@ struct alignas(16) LeafTriangle {
   Vec3 a;
   std::uint32_t triangle;  // index into the scene's triangles
   Vec3 b;
-  std::uint32_t flags;     // kCullBack, kAlphaTest
+  std::uint32_t flags;  // kCullBack, kAlphaTest
   Vec3 c;
   std::uint32_t geometry;  // index into the scene's geometries
 };
@@ -51,7 +51,7 @@ inline constexpr std::uint32_t kAlphaTest = 2;  // alpha mode MASK
 inline constexpr std::uint32_t kBlend = 4;      // alpha mode BLEND: shadow rays are dimmed
 
 struct OctreeView {
-  Span<Node> nodes;              // the root is node 0; empty: nothing to hit
+  Span<Node> nodes;  // the root is node 0; empty: nothing to hit
   Span<LeafTriangle> triangles;
 };
 

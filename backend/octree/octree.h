@@ -16,20 +16,20 @@ enum class Builder { median, sah };
 
 struct BuildOptions {
   Builder builder = Builder::sah;
-  std::uint32_t leaf = 0;   // median: most vertices in a leaf (0: 8); sah: most triangles (0: 3)
-  unsigned threads = 0;     // 0: all
+  std::uint32_t leaf = 0;  // median: most vertices in a leaf (0: 8); sah: most triangles (0: 3)
+  unsigned threads = 0;    // 0: all
   std::uint64_t max_bytes = 64ull << 30;  // --max-scene-bytes
 };
 
 struct Statistics {
   std::uint64_t nodes = 0;
-  std::uint64_t leaves = 0;         // child slots that hold triangles
+  std::uint64_t leaves = 0;  // child slots that hold triangles
   std::uint64_t triangles = 0;
-  std::uint32_t depth = 0;          // nodes on the longest path from the root
-  std::uint64_t bytes = 0;          // nodes and leaf triangles
+  std::uint32_t depth = 0;  // nodes on the longest path from the root
+  std::uint64_t bytes = 0;  // nodes and leaf triangles
   double children_per_node = 0.0;
   double triangles_per_leaf = 0.0;
-  double sah_cost = 0.0;            // expected node and triangle tests of a random ray
+  double sah_cost = 0.0;  // expected node and triangle tests of a random ray
 };
 
 struct Octree {

@@ -1,0 +1,148 @@
+#include <fmt/format.h>
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
+#include <algorithm>
+
+#include "backend/octree/builders.h"
+#include "backend/octree/octree.h"
+#include "backend/octree/tree.h"
+
+namespace octrace::octree {
+
+namespace {
+
+constexpr std::uint32_t kPaperLeaf = 8;  // the threshold of the paper's experiment
+constexpr std::uint32_t kParallelTriangles = 4096;
+
+// Writes the tree into flat arrays, depth first: a node's inner children side by side, and below
+// each its own subtree. Sizes of subtrees are known, so subtrees are written at the same time.
+class Layout {
+ public:
+  Layout(const BuildInput& input, std::span<const std::uint32_t> ids, Octree& octree)
+      : input_(input), ids_(ids), octree_(octree) {}
+
+  void write(const TreeNode& root) {
+    octree_.nodes.resize(root.subtree_nodes);
+    octree_.triangles.resize(root.subtree_triangles);
+    write_node(root, 0, 1, 0);
+  }
+
+ private:
+  // `below` is where the nodes under this one begin; `triangle` where its leaf triangles do.
+  void write_node(const TreeNode& tree, std::uint32_t index, std::uint32_t below,
+                  std::uint32_t triangle) {
+    kernels::Node& node = octree_.nodes[index];
+    node = tree.node;
+    node.first_child = below;
+    node.first_triangle = triangle;
+    for (int slot = 0; slot < kernels::kChildren; ++slot) {
+      for (std::uint32_t i = 0; i < tree.leaf_count[slot]; ++i) {
+        octree_.triangles[triangle++] = leaf_triangle(ids_[tree.leaf_first[slot] + i]);
+      }
+    }
+    struct Job {
+      const TreeNode* tree;
+      std::uint32_t index, below, triangle;
+    };
+    std::array<Job, kernels::kChildren> jobs;
+    std::size_t count = 0;
+    std::uint32_t next = below + static_cast<std::uint32_t>(std::popcount(node.inner_mask));
+    for (const TreeNode* child : tree.children) {
+      if (child == nullptr) continue;
+      jobs[count] = {child, below + static_cast<std::uint32_t>(count), next, triangle};
+      next += child->subtree_nodes - 1;
+      triangle += child->subtree_triangles;
+      ++count;
+    }
+    const auto run = [&](std::size_t i) {
+      write_node(*jobs[i].tree, jobs[i].index, jobs[i].below, jobs[i].triangle);
+    };
+    if (tree.subtree_triangles < kParallelTriangles) {
+      for (std::size_t i = 0; i < count; ++i) run(i);
+    } else {
+      tbb::parallel_for(std::size_t{0}, count, run);
+    }
+  }
+
+  kernels::LeafTriangle leaf_triangle(std::uint32_t id) const {
+    const kernels::Triangle& t = input_.triangles[id];
+    const std::uint32_t geometry =
+        input_.triangle_geometry.empty() ? 0 : input_.triangle_geometry[id];
+    const std::uint32_t flags = input_.flags.empty() ? 0 : input_.flags[geometry];
+    return {input_.positions[t.a], id,      input_.positions[t.b], flags,
+            input_.positions[t.c], geometry};
+  }
+
+  const BuildInput& input_;
+  std::span<const std::uint32_t> ids_;
+  Octree& octree_;
+};
+
+// Sizes of the largest arrays alive at once while building; an upper estimate.
+std::uint64_t build_bytes(std::uint64_t triangles) {
+  constexpr std::uint64_t kReference = 32, kTreeNodes = sizeof(TreeNode) / 4, kId = 4;
+  return triangles * (kReference + kTreeNodes + kId + sizeof(kernels::LeafTriangle) +
+                      sizeof(kernels::Node) / 4);
+}
+
+std::vector<std::uint32_t> geometry_flags(const scene::Scene& scene) {
+  std::vector<std::uint32_t> flags;
+  flags.reserve(scene.geometries.size());
+  for (const kernels::Geometry& geometry : scene.geometries) {
+    const kernels::Material& material = scene.materials[geometry.material];
+    flags.push_back((material.double_sided ? 0u : kernels::kCullBack) |
+                    (material.alpha_mode == kernels::AlphaMode::mask ? kernels::kAlphaTest : 0u) |
+                    (material.alpha_mode == kernels::AlphaMode::blend ? kernels::kBlend : 0u));
+  }
+  return flags;
+}
+
+BuildInput input_of(const scene::Scene& scene, std::span<const std::uint32_t> flags) {
+  return {scene.positions, scene.triangles, scene.triangle_geometry, flags};
+}
+
+}  // namespace
+
+util::Result<Octree> build(const BuildInput& input, const BuildOptions& options) {
+  const std::uint64_t needed = build_bytes(input.triangles.size());
+  if (input.triangles.size() > 0x7fffffffu || needed > options.max_bytes) {
+    return util::Error{util::Exit::limit, "",
+                       fmt::format("the octree of {} triangles needs about {} bytes while it is "
+                                   "built; --max-scene-bytes is {}",
+                                   input.triangles.size(), needed, options.max_bytes),
+                       "", ""};
+  }
+  Octree octree;
+  const auto run = [&] {
+    TreeArena arena;
+    std::vector<std::uint32_t> ids;
+    TreeNode* root = nullptr;
+    if (options.builder == Builder::median) {
+      root = build_median(input, options.leaf == 0 ? kPaperLeaf : options.leaf, arena, ids);
+    } else {
+      constexpr std::uint32_t kMost = kernels::kMaxLeafTriangles;
+      root =
+          build_sah(input, options.leaf == 0 ? kMost : std::min(options.leaf, kMost), arena, ids);
+    }
+    if (root != nullptr) Layout(input, ids, octree).write(*root);
+  };
+  if (options.threads == 0) {
+    run();
+  } else {
+    tbb::task_arena(static_cast<int>(options.threads)).execute(run);
+  }
+  return octree;
+}
+
+util::Result<Octree> build(const scene::Scene& scene, const BuildOptions& options) {
+  const std::vector<std::uint32_t> flags = geometry_flags(scene);
+  return build(input_of(scene, flags), options);
+}
+
+util::Result<void> verify(const Octree& octree, const scene::Scene& scene) {
+  const std::vector<std::uint32_t> flags = geometry_flags(scene);
+  return verify(octree, input_of(scene, flags));
+}
+
+}  // namespace octrace::octree

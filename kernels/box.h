@@ -1,0 +1,111 @@
+// The slab test, conservative by construction (after Kay and Kajiya 1986; padding after Ize 2013,
+// "Robust BVH ray traversal").
+//
+// Why the padding: a hit must not depend on the tree. Let M be the largest distance along an axis
+// from the ray's origin to the box. slab() widens a box by M * 2^-20 on every side. Every operation
+// in it is monotone under rounding, so a box inside another gets an interval inside the other's.
+// child_slab() computes the same from quantised children with other roundings, at most
+// 7 * 2^-24 * M away, and widens by M * 2^-19: its interval holds that of every triangle's own box
+// below it. The triangle test clamps t into the slab() interval of the triangle's box
+// (triangle.h), so no node on the way to a hit can be missed, whatever the builder.
+#pragma once
+
+#include "kernels/node.h"
+#include "kernels/ray.h"
+#include "kernels/round.h"
+
+namespace octrace::kernels {
+
+struct Interval {
+  float near, far;  // empty where near > far
+};
+
+inline constexpr float kBoxPadding = 1.0f / (1 << 20);
+inline constexpr float kChildPadding = 1.0f / (1 << 19);
+
+// A ray prepared for slab tests.
+struct SlabRay {
+  Vec3 origin;
+  Vec3 inverse;          // 1 / direction, finite
+  std::uint32_t octant;  // bit a: direction is negative along axis a
+};
+
+// Directions count as no closer to zero than 2^-80, which keeps 1/d and its products with
+// coordinates below kMaxCoordinate finite, and which the padding covers: over the box's distance a
+// ray strays from the axis plane by less than 2^-50 of it.
+OCTRACE_HD OCTRACE_FORCE_INLINE float safe_inverse(float d) {
+  constexpr float kTiny = 8.271806125530277e-25f;  // 2^-80
+  if (abs_of(d) < kTiny) d = d < 0.0f ? -kTiny : kTiny;
+  return div_rn(1.0f, d);
+}
+
+OCTRACE_HD OCTRACE_FORCE_INLINE SlabRay make_slab_ray(const Ray& ray) {
+  const Vec3 d = ray.direction;
+  return {ray.origin, Vec3(safe_inverse(d.x), safe_inverse(d.y), safe_inverse(d.z)),
+          (d.x < 0.0f ? 1u : 0u) | (d.y < 0.0f ? 2u : 0u) | (d.z < 0.0f ? 4u : 0u)};
+}
+
+OCTRACE_HD OCTRACE_FORCE_INLINE Interval slab_axis(float lower, float upper, float padding,
+                                                   float inverse, bool negative) {
+  const float a = mul_rn(sub_rn(lower, padding), inverse);
+  const float b = mul_rn(add_rn(upper, padding), inverse);
+  return negative ? Interval{b, a} : Interval{a, b};
+}
+
+// Where along the ray the box lies, never too narrow.
+OCTRACE_HD OCTRACE_FORCE_INLINE Interval slab(const Vec3& lower, const Vec3& upper,
+                                              const SlabRay& ray) {
+  const Vec3 l(sub_rn(lower.x, ray.origin.x), sub_rn(lower.y, ray.origin.y),
+               sub_rn(lower.z, ray.origin.z));
+  const Vec3 u(sub_rn(upper.x, ray.origin.x), sub_rn(upper.y, ray.origin.y),
+               sub_rn(upper.z, ray.origin.z));
+  const float mx = greater(abs_of(l.x), abs_of(u.x));
+  const float my = greater(abs_of(l.y), abs_of(u.y));
+  const float mz = greater(abs_of(l.z), abs_of(u.z));
+  const float padding = mul_rn(greater(greater(mx, my), mz), kBoxPadding);
+  const Interval x = slab_axis(l.x, u.x, padding, ray.inverse.x, ray.octant & 1);
+  const Interval y = slab_axis(l.y, u.y, padding, ray.inverse.y, ray.octant & 2);
+  const Interval z = slab_axis(l.z, u.z, padding, ray.inverse.z, ray.octant & 4);
+  return {greater(greater(x.near, y.near), z.near), lesser(lesser(x.far, y.far), z.far)};
+}
+
+// A node's frame in the ray's terms: a child's plane q along axis a lies at t = q * step[a] +
+// near[a] where it is entered and q * step[a] + far[a] where it is left.
+struct NodeFrame {
+  Vec3 step, near, far;
+};
+
+OCTRACE_HD OCTRACE_FORCE_INLINE float power_of_two(std::int8_t exponent) {
+  const std::uint32_t bits = static_cast<std::uint32_t>(exponent + 127) << 23;
+#if defined(__CUDA_ARCH__)
+  return __uint_as_float(bits);
+#else
+  float value;
+  __builtin_memcpy(&value, &bits, sizeof value);
+  return value;
+#endif
+}
+
+OCTRACE_HD OCTRACE_FORCE_INLINE NodeFrame node_frame(const Node& node, const SlabRay& ray) {
+  const Vec3 scale(power_of_two(node.exponent[0]), power_of_two(node.exponent[1]),
+                   power_of_two(node.exponent[2]));
+  const Vec3 l(node.origin[0] - ray.origin.x, node.origin[1] - ray.origin.y,
+               node.origin[2] - ray.origin.z);
+  const Vec3 u(l.x + 255.0f * scale.x, l.y + 255.0f * scale.y, l.z + 255.0f * scale.z);
+  const float mx = greater(abs_of(l.x), abs_of(u.x));
+  const float my = greater(abs_of(l.y), abs_of(u.y));
+  const float mz = greater(abs_of(l.z), abs_of(u.z));
+  const float padding = greater(greater(mx, my), mz) * kChildPadding;
+  const Vec3 i = ray.inverse;
+  // The padding moves the entry back and the exit on, whichever way the ray runs.
+  const Vec3 signed_padding(ray.octant & 1 ? -padding : padding,
+                            ray.octant & 2 ? -padding : padding,
+                            ray.octant & 4 ? -padding : padding);
+  return {Vec3(scale.x * i.x, scale.y * i.y, scale.z * i.z),
+          Vec3((l.x - signed_padding.x) * i.x, (l.y - signed_padding.y) * i.y,
+               (l.z - signed_padding.z) * i.z),
+          Vec3((l.x + signed_padding.x) * i.x, (l.y + signed_padding.y) * i.y,
+               (l.z + signed_padding.z) * i.z)};
+}
+
+}  // namespace octrace::kernels

@@ -1,0 +1,113 @@
+// The watertight ray/triangle test of Woop, Benthin and Wald 2013 ("Watertight Ray/Triangle
+// Intersection"), with fixed roundings.
+//
+// Corners are moved to the ray's origin and sheared so that the ray becomes the z axis; the signs
+// of three 2D edge functions then decide. A product of two floats rounds monotonically, so the sign
+// of a difference of two products is right or the difference is zero; zeros are computed again in
+// double, where the products are exact. Hence triangles that share an edge never leave a gap.
+//
+// t is clamped into the slab interval of the triangle's own box: see box.h for why.
+#pragma once
+
+#include "kernels/box.h"
+#include "kernels/ray.h"
+#include "kernels/round.h"
+
+namespace octrace::kernels {
+
+// A ray prepared for triangle tests: rows of the shear. Each row has a 1 or a scale in one place
+// and a 0 in another, so a dot product by fma needs no permutation of the corner and rounds the
+// same for every triangle of this ray, which is what watertightness asks for.
+struct TriangleRay {
+  Vec3 row_x, row_y, row_z;
+};
+
+OCTRACE_HD OCTRACE_FORCE_INLINE TriangleRay make_triangle_ray(const Vec3& d) {
+  const float ax = abs_of(d.x), ay = abs_of(d.y), az = abs_of(d.z);
+  TriangleRay ray;
+  bool negative;
+  if (az >= ax && az >= ay) {
+    ray = {Vec3(1.0f, 0.0f, -div_rn(d.x, d.z)), Vec3(0.0f, 1.0f, -div_rn(d.y, d.z)),
+           Vec3(0.0f, 0.0f, div_rn(1.0f, d.z))};
+    negative = d.z < 0.0f;
+  } else if (ay >= ax) {
+    ray = {Vec3(0.0f, -div_rn(d.z, d.y), 1.0f), Vec3(1.0f, -div_rn(d.x, d.y), 0.0f),
+           Vec3(0.0f, div_rn(1.0f, d.y), 0.0f)};
+    negative = d.y < 0.0f;
+  } else {
+    ray = {Vec3(-div_rn(d.y, d.x), 1.0f, 0.0f), Vec3(-div_rn(d.z, d.x), 0.0f, 1.0f),
+           Vec3(div_rn(1.0f, d.x), 0.0f, 0.0f)};
+    negative = d.x < 0.0f;
+  }
+  if (negative) {  // keeps the winding: a front face has a positive determinant
+    const Vec3 row = ray.row_x;
+    ray.row_x = ray.row_y;
+    ray.row_y = row;
+  }
+  return ray;
+}
+
+OCTRACE_HD OCTRACE_FORCE_INLINE float shear(const Vec3& row, const Vec3& v) {
+  return fma_rn(row.x, v.x, fma_rn(row.y, v.y, mul_rn(row.z, v.z)));
+}
+
+OCTRACE_HD OCTRACE_FORCE_INLINE Vec3 relative_to(const Vec3& corner, const Vec3& origin) {
+  return Vec3(sub_rn(corner.x, origin.x), sub_rn(corner.y, origin.y), sub_rn(corner.z, origin.z));
+}
+
+OCTRACE_HD OCTRACE_FORCE_INLINE float edge(float ax, float ay, float bx, float by) {
+  return sub_rn(mul_rn(ax, by), mul_rn(ay, bx));
+}
+
+OCTRACE_HD inline float exact_edge(float ax, float ay, float bx, float by) {
+  return static_cast<float>(sub_rn(mul_rn(static_cast<double>(ax), static_cast<double>(by)),
+                                   mul_rn(static_cast<double>(ay), static_cast<double>(bx))));
+}
+
+struct TriangleHit {
+  float t, u, v;  // u, v: weights of the second and third corner
+};
+
+// Does the ray hit the triangle a, b, c with tmin <= t <= tmax? cull_back: counter-clockwise seen
+// from the origin only. Degenerate triangles are never hit.
+OCTRACE_HD OCTRACE_FORCE_INLINE bool intersect_triangle(const SlabRay& slab_ray,
+                                                        const TriangleRay& ray, const Vec3& a,
+                                                        const Vec3& b, const Vec3& c, float tmin,
+                                                        float tmax, bool cull_back,
+                                                        TriangleHit* hit) {
+  const Vec3 ra = relative_to(a, slab_ray.origin);
+  const Vec3 rb = relative_to(b, slab_ray.origin);
+  const Vec3 rc = relative_to(c, slab_ray.origin);
+  const float ax = shear(ray.row_x, ra), ay = shear(ray.row_y, ra);
+  const float bx = shear(ray.row_x, rb), by = shear(ray.row_y, rb);
+  const float cx = shear(ray.row_x, rc), cy = shear(ray.row_y, rc);
+  float wa = edge(cx, cy, bx, by);
+  float wb = edge(ax, ay, cx, cy);
+  float wc = edge(bx, by, ax, ay);
+  if (wa == 0.0f || wb == 0.0f || wc == 0.0f) {
+    wa = exact_edge(cx, cy, bx, by);
+    wb = exact_edge(ax, ay, cx, cy);
+    wc = exact_edge(bx, by, ax, ay);
+  }
+  const bool any_negative = wa < 0.0f || wb < 0.0f || wc < 0.0f;
+  const bool any_positive = wa > 0.0f || wb > 0.0f || wc > 0.0f;
+  if (any_negative && (any_positive || cull_back)) return false;
+  const float determinant = add_rn(add_rn(wa, wb), wc);
+  if (determinant == 0.0f) return false;
+
+  const float scaled =
+      add_rn(add_rn(mul_rn(wa, shear(ray.row_z, ra)), mul_rn(wb, shear(ray.row_z, rb))),
+             mul_rn(wc, shear(ray.row_z, rc)));
+  const Vec3 lower(lesser(lesser(a.x, b.x), c.x), lesser(lesser(a.y, b.y), c.y),
+                   lesser(lesser(a.z, b.z), c.z));
+  const Vec3 upper(greater(greater(a.x, b.x), c.x), greater(greater(a.y, b.y), c.y),
+                   greater(greater(a.z, b.z), c.z));
+  const Interval interval = slab(lower, upper, slab_ray);
+  if (!(interval.near <= interval.far)) return false;
+  const float t = lesser(greater(div_rn(scaled, determinant), interval.near), interval.far);
+  if (!(t >= tmin && t <= tmax)) return false;
+  *hit = {t, div_rn(wb, determinant), div_rn(wc, determinant)};
+  return true;
+}
+
+}  // namespace octrace::kernels
