@@ -24,7 +24,12 @@ util::Result<void> write_exr_file(const std::string& path, const ImageView& imag
     if (image.channels[c].name == "A") spec.alpha_channel = static_cast<int>(c);
     if (image.channels[c].name == "Z") spec.z_channel = static_cast<int>(c);
   }
-  spec.attribute("compression", kExrCompression);
+  // Blocks of 16 rows at zlib's level 1: of zip, zips, rle and none at several levels it was the
+  // fastest that halves the size (1280x720 of Z and ids: 57 ms and 2.7 MB; zips 133 ms, none 24 ms
+  // and 7.4 MB).
+  spec.attribute("compression", "zip:1");
+  // Left unset, the library writes the time, and files of equal pixels would differ.
+  spec.attribute("DateTime", "");
   spec.attribute("oiio:ColorSpace", "Linear");
   spec.attribute("openexr:lineOrder", "increasingY");
   for (const auto& [name, value] : image.metadata) spec.attribute(name, value);

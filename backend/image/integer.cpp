@@ -118,12 +118,23 @@ util::Result<void> write_integer_file(const std::string& path, const ImageView& 
                        words ? OIIO::TypeDesc::UINT16 : OIIO::TypeDesc::UINT8);
   // Alpha is divided out here, once, so the writer must not do it again.
   spec.attribute("oiio:UnassociatedAlpha", 1);
-  spec.attribute("oiio:ColorSpace", encoding == Encoding::srgb8 ? "sRGB" : "Linear");
+  const bool tiff = format == "tif" || format == "tiff";
+  // OpenImageIO 2.4.7 puts a TIFF's colour space into an Exif directory that makes it unreadable.
+  if (!tiff) {
+    spec.attribute("oiio:ColorSpace", encoding == Encoding::srgb8 ? "sRGB" : "Linear");
+  }
+  if (tiff) spec.attribute("compression", "zip");
   if (jpeg) spec.attribute("compression", "jpeg:95");
-  if (format == "tif" || format == "tiff") spec.attribute("compression", "zip");
   // Level 6 costs four times the time of level 1 and saves a tenth of the bytes of rendered images.
   spec.attribute("png:compressionLevel", 3);
-  for (const auto& [name, value] : image.metadata) spec.attribute(name, value);
+  if (jpeg) spec.attribute("jpeg:subsampling", "4:4:4");
+  spec.attribute("DateTime", "");  // as in an EXR: equal pixels, equal bytes
+  std::string description;         // TIFF and JPEG keep no names of our own
+  for (const auto& [name, value] : image.metadata) {
+    spec.attribute(name, value);
+    description += fmt::format("{}{}={}", description.empty() ? "" : "; ", name, value);
+  }
+  if (tiff || jpeg) spec.attribute("ImageDescription", description);
 
   const std::size_t pixel_bytes = spec.pixel_bytes();
   return write_file(path, spec, [&](std::uint32_t begin, std::uint32_t end, unsigned char* out) {

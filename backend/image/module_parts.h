@@ -5,8 +5,6 @@
 
 namespace octrace::image {
 
-inline constexpr const char* kExrCompression = "zips";
-
 util::Result<void> write_exr_file(const std::string& path, const ImageView& image);
 util::Result<void> write_integer_file(const std::string& path, const ImageView& image,
                                       Encoding encoding, double scale);
