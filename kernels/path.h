@@ -21,10 +21,16 @@ inline constexpr float kLeastWeight = 1e-4f;
 // Radiance above this is cut, so that sums stay finite whatever a scene's lights emit.
 inline constexpr float kMaxRadiance = 1e30f;
 
+// A surface seen in a rough reflection shows highlights no sharper than this multiple of the
+// reflection's own lobe: the eye cannot tell, and a rough lobe would find sharp ones too seldom, as
+// bright specks (Kaplanyan and Dachsbacher 2013, "Path space regularization").
+inline constexpr float kReflectionBlur = 3.0f;
+
 struct Segment {
   Ray ray;
   Vec3 weight;       // of what this ray sees, in the pixel
   float sky_weight;  // further factor for the sky: the occlusion texture where the ray left
+  float blur;        // GGX alpha of the reflection that sent it; 0: straight from the camera
   bool reflected;
   std::uint32_t layer;
 };
@@ -77,6 +83,7 @@ OCTRACE_HD inline Segment reflection(const ShadingPoint& at, const BrdfSample& s
   return {{at.origin, 0.0f, sample.direction, std::numeric_limits<float>::infinity()},
           terminator(at, sample.direction) * (weight * sample.weight),
           at.occlusion,
+          kReflectionBlur * at.brdf.alpha,
           true,
           0};
 }
@@ -94,7 +101,7 @@ OCTRACE_HD TraceStatus trace_path(const SceneView& scene, const RenderParams& pa
                                   RayCounts* counts, Vec4* color) {
   Vec3 radiance(0.0f);
   float background = 0.0f;
-  Segment segment{ray, Vec3(1.0f), 1.0f, false, 0};
+  Segment segment{ray, Vec3(1.0f), 1.0f, 0.0f, false, 0};
   Segment later = segment;  // the camera ray behind the surface whose reflection is being followed
   bool is_later = false;
   for (;;) {
@@ -120,7 +127,8 @@ OCTRACE_HD TraceStatus trace_path(const SceneView& scene, const RenderParams& pa
         radiance += bounded(weight * Vec3(base.x, base.y, base.z));
       } else if (alpha > 0.0f) {
         const Vec3 view = normalize_or(-segment.ray.direction, surface.geometric_normal);
-        const ShadingPoint at = make_shading_point(scene, surface, view, base);
+        ShadingPoint at = make_shading_point(scene, surface, view, base);
+        at.brdf.alpha = lesser(greater(at.brdf.alpha, segment.blur), 1.0f);
         const std::uint32_t dimension =
             1 + kDimensions * (segment.layer + (segment.reflected ? kMaxLayers : 0));
         Vec3 seen = at.emission;
