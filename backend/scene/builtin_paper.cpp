@@ -1,7 +1,10 @@
 // The seed's experiment: 855 vertices, 1692 triangles, seen from (0, 0, Z) for four values of Z.
 // Its own model is not published; this one is a trefoil knot of 95 rings of 9 vertices, the last
 // ring on the first, so that 95 * 9 = 855 and 2 * 94 * 9 = 1692.
+#include <fmt/format.h>
+
 #include <cmath>
+#include <limits>
 
 #include "backend/scene/builtin.h"
 #include "backend/scene/exact_math.h"
@@ -38,7 +41,7 @@ Scene make_paper_scene() {
 
   for (const int z : {700, 600, 500, 400}) {
     Camera camera = look_at({0.0, 0.0, static_cast<double>(z)}, glm::dvec3(0.0), 0.8);
-    camera.name = "Z" + std::to_string(z);
+    camera.name = fmt::format("Z{}", z);
     camera.znear = 1.0;
     builder.scene().cameras.push_back(camera);
   }

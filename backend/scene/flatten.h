@@ -31,6 +31,16 @@ struct FlattenOptions {
   ImageDecoder decode;
 };
 
+// In the static pose: the nodes' own transforms, default weights of morph targets. Missing normals
+// stay missing (flat shading, as the specification says), and so do missing tangents, which the
+// renderer derives from positions and texture coordinates.
 util::Result<Scene> flatten(const gltf::Document& document, const FlattenOptions& options);
+
+struct Pose;
+util::Result<Scene> flatten(const gltf::Document& document, const Pose& pose,
+                            const FlattenOptions& options);
+
+// `roots` and all their descendants, ascending.
+std::vector<int> reachable_nodes(const tinygltf::Model& model, const std::vector<int>& roots);
 
 }  // namespace octrace::scene

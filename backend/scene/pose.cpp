@@ -76,7 +76,8 @@ std::vector<glm::dmat4> world_matrices(const tinygltf::Model& model, const Pose&
     for (const int child : node.children) is_child[child] = true;
   }
   std::vector<glm::dmat4> worlds(model.nodes.size(), glm::dmat4(1.0));
-  // A list instead of recursion: hierarchies may be as deep as the file is long.
+  // A list instead of recursion: hierarchies may be as deep as the file is long. Each child is
+  // placed once; validation refuses nodes of two parents.
   std::vector<int> pending;
   for (std::size_t i = 0; i < model.nodes.size(); ++i) {
     if (is_child[i]) continue;
@@ -87,6 +88,8 @@ std::vector<glm::dmat4> world_matrices(const tinygltf::Model& model, const Pose&
     const int parent = pending.back();
     pending.pop_back();
     for (const int child : model.nodes[parent].children) {
+      if (!is_child[child]) continue;
+      is_child[child] = false;
       worlds[child] = worlds[parent] * pose.nodes[child].evaluate();
       pending.push_back(child);
     }

@@ -1,0 +1,103 @@
+#include "backend/scene/flatten.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "backend/scene/flatten_geometry.h"
+#include "backend/scene/flatten_materials.h"
+#include "backend/scene/flatten_placed.h"
+#include "backend/scene/names.h"
+#include "backend/scene/pose.h"
+
+namespace octrace::scene {
+
+namespace {
+
+// The nodes that a scene shows start from these.
+util::Result<std::vector<int>> root_nodes(const gltf::Document& document,
+                                          std::optional<int> chosen) {
+  const tinygltf::Model& model = document.model;
+  if (chosen && (*chosen < 0 || static_cast<std::size_t>(*chosen) >= model.scenes.size())) {
+    std::vector<std::string> names;
+    for (std::size_t i = 0; i < model.scenes.size() && i < 10; ++i) {
+      names.push_back(fmt::format("{} \"{}\"", i, printable(name_of(model.scenes, i, "scene"))));
+    }
+    if (model.scenes.size() > names.size()) names.push_back("...");
+    return util::Error{
+        util::Exit::usage, "",
+        fmt::format("there is no scene {}; the file has {}{}{}", *chosen, model.scenes.size(),
+                    names.empty() ? "" : ": ", fmt::join(names, ", ")),
+        document.file, ""};
+  }
+  if (!model.scenes.empty()) {
+    const int index = chosen ? *chosen : std::max(model.defaultScene, 0);
+    return model.scenes[index].nodes;
+  }
+  std::vector<bool> is_child(model.nodes.size(), false);
+  for (const auto& node : model.nodes) {
+    for (const int child : node.children) is_child[child] = true;
+  }
+  std::vector<int> roots;
+  for (std::size_t i = 0; i < model.nodes.size(); ++i) {
+    if (!is_child[i]) roots.push_back(static_cast<int>(i));
+  }
+  return roots;
+}
+
+}  // namespace
+
+std::vector<int> reachable_nodes(const tinygltf::Model& model, const std::vector<int>& roots) {
+  std::vector<bool> reached(model.nodes.size(), false);
+  std::vector<int> pending = roots;
+  while (!pending.empty()) {
+    const int node = pending.back();
+    pending.pop_back();
+    if (reached[node]) continue;
+    reached[node] = true;
+    const auto& children = model.nodes[node].children;
+    pending.insert(pending.end(), children.begin(), children.end());
+  }
+  std::vector<int> nodes;
+  for (std::size_t i = 0; i < reached.size(); ++i) {
+    if (reached[i]) nodes.push_back(static_cast<int>(i));
+  }
+  return nodes;
+}
+
+util::Result<Scene> flatten(const gltf::Document& document, const FlattenOptions& options) {
+  return flatten(document, static_pose(document.model), options);
+}
+
+util::Result<Scene> flatten(const gltf::Document& document, const Pose& pose,
+                            const FlattenOptions& options) {
+  const tinygltf::Model& model = document.model;
+  if (model.nodes.size() > options.limits.max_nodes) {
+    return util::Error{util::Exit::limit, "",
+                       fmt::format("has {} nodes, --max-nodes allows {}", model.nodes.size(),
+                                   options.limits.max_nodes),
+                       document.file, "/nodes"};
+  }
+  const auto roots = root_nodes(document, options.scene);
+  if (!roots) return roots.error();
+  const std::vector<int> nodes = reachable_nodes(model, *roots);
+  const auto plan = plan_geometry(document, nodes, options.limits);
+  if (!plan) return plan.error();
+
+  Scene scene;
+  scene.warnings = plan->warnings;
+  const std::vector<glm::dmat4> worlds = world_matrices(model, pose);
+  if (auto ok = place_geometry(document, *plan, pose, worlds, scene); !ok) return ok.error();
+  if (auto ok = place_cameras(document, nodes, worlds, scene); !ok) return ok.error();
+  if (auto ok = place_lights(document, nodes, worlds, scene); !ok) return ok.error();
+  if (auto ok = place_materials(document, options, plan->default_material, scene); !ok) {
+    return ok.error();
+  }
+  scene.object_names.reserve(model.nodes.size());
+  for (std::size_t i = 0; i < model.nodes.size(); ++i) {
+    scene.object_names.push_back(name_of(model.nodes, i, "node"));
+  }
+  return scene;
+}
+
+}  // namespace octrace::scene

@@ -1,0 +1,47 @@
+// The geometry stage of flattening: which primitive of which node goes where in the scene's arrays,
+// and filling them from a pose.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "backend/gltf/document.h"
+#include "backend/scene/pose.h"
+#include "backend/scene/scene.h"
+#include "backend/util/limits.h"
+#include "backend/util/result.h"
+
+namespace octrace::scene {
+
+// Everything that does not depend on the pose: sizes and places in the arrays.
+struct GeometryPlan {
+  struct Instance {
+    int node;
+    std::uint32_t geometry;  // index into geometries
+  };
+  // One primitive of one mesh and the nodes that show it; its data is read from the file once.
+  struct Source {
+    int mesh, primitive;
+    std::vector<Instance> instances;
+  };
+  std::vector<Source> sources;
+  std::vector<kernels::Geometry> geometries;  // by node, then by primitive
+  std::uint64_t triangles = 0, vertices = 0;
+  std::uint64_t normals = 0, tangents = 0, uvs = 0, colors = 0;
+  bool default_material = false;  // some primitive names none: geometries use materials.size()
+  std::vector<std::string> warnings;
+
+  std::uint64_t bytes() const;
+};
+
+// `nodes`: those to show, ascending. Errors (exit 6) where a limit would be passed; nothing has
+// been allocated in proportion to counts in the file by then.
+util::Result<GeometryPlan> plan_geometry(const gltf::Document& document,
+                                         const std::vector<int>& nodes, const util::Limits& limits);
+
+// Fills the arrays of geometry and the bounds.
+util::Result<void> place_geometry(const gltf::Document& document, const GeometryPlan& plan,
+                                  const Pose& pose, const std::vector<glm::dmat4>& worlds,
+                                  Scene& scene);
+
+}  // namespace octrace::scene
