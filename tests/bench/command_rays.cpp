@@ -1,0 +1,210 @@
+// octrace-bench rays: Mrays/s of the three ray sets, beside Embree in the same process, turn about.
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "backend/util/atomic_file.h"
+#include "tests/bench/bench_scene.h"
+#include "tests/bench/commands.h"
+#include "tests/bench/embree_peer.h"
+#include "tests/bench/octrace_tracer.h"
+#include "tests/bench/ray_sets.h"
+#include "tests/bench/statistics.h"
+
+namespace octrace::bench {
+
+namespace {
+
+struct Options {
+  std::vector<std::string> scenes;
+  std::string camera, size = "1280x720", peer, json, builder = "sah";
+  std::vector<std::string> sets = {"primary", "bounce", "ao"};
+  unsigned threads = 1;
+  int repeats = 5;
+};
+
+const char* name_of(EmbreePeer::Interface interface) {
+  switch (interface) {
+    case EmbreePeer::Interface::single:
+      return "single";
+    case EmbreePeer::Interface::packet:
+      return "packet";
+    case EmbreePeer::Interface::stream:
+      return "stream";
+  }
+  return "";
+}
+
+// The share of rays whose hits agree: the same triangle, or the same t within 1e-5.
+double agreement(const std::vector<kernels::Hit>& a, const std::vector<kernels::Hit>& b,
+                 bool any_hit) {
+  std::size_t agreeing = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    const bool same_kind = a[i].valid() == b[i].valid();
+    const bool same = any_hit || !a[i].valid() || a[i].triangle == b[i].triangle ||
+                      std::abs(a[i].t - b[i].t) <= 1e-5f * std::abs(b[i].t);
+    agreeing += same_kind && same;
+  }
+  return a.empty() ? 1.0 : static_cast<double>(agreeing) / static_cast<double>(a.size());
+}
+
+class SceneBench {
+ public:
+  SceneBench(const Options& options, std::string name, scene::Scene scene, octree::Octree octree)
+      : options_(options),
+        name_(std::move(name)),
+        scene_(std::move(scene)),
+        octree_(std::move(octree)) {
+    if (options.peer == "embree") {
+      peer_.emplace(scene_, EmbreePeer::Quality::high, options.threads);
+    }
+  }
+
+  bool run(const kernels::RayCamera& camera, int width, int height, nlohmann::json& rows) {
+    const std::vector<kernels::Ray> primary = primary_rays(camera, width, height);
+    std::vector<kernels::Hit> hits;
+    trace_cpu(scene_, octree_, primary, false, options_.threads, &hits);
+    for (const RaySet set : {RaySet::primary, RaySet::bounce, RaySet::ao}) {
+      if (std::find(options_.sets.begin(), options_.sets.end(), bench::name_of(set)) ==
+          options_.sets.end())
+        continue;
+      const Rays rays = set == RaySet::primary ? Rays{set, false, primary}
+                                               : secondary_rays(set, scene_, primary, hits);
+      if (!run_set(rays, rows)) return false;
+    }
+    return true;
+  }
+
+ private:
+  bool run_set(const Rays& rays, nlohmann::json& rows) {
+    std::vector<kernels::Hit> ours;
+    trace_cpu(scene_, octree_, rays.rays, rays.any_hit, options_.threads, &ours);  // warms up, too
+    std::vector<EmbreePeer::Interface> interfaces;
+    if (peer_) {
+      interfaces = {EmbreePeer::Interface::single, EmbreePeer::Interface::packet,
+                    EmbreePeer::Interface::stream};
+      std::vector<kernels::Hit> theirs;
+      peer_->trace(rays.rays, rays.any_hit, interfaces[0], options_.threads, &theirs);
+      const double agreeing = agreement(ours, theirs, rays.any_hit);
+      if (agreeing < 0.9999) {
+        fmt::print(stderr,
+                   "octrace-bench: {} {}: hits agree with Embree's on only {:.4f} % of the rays\n",
+                   name_, bench::name_of(rays.set), 100.0 * agreeing);
+        return false;
+      }
+    }
+    std::vector<double> own;
+    std::vector<std::vector<double>> peers(interfaces.size());
+    for (int i = 0; i < options_.repeats; ++i) {  // turn about, so that both see the same machine
+      own.push_back(trace_cpu(scene_, octree_, rays.rays, rays.any_hit, options_.threads, nullptr));
+      for (std::size_t k = 0; k < interfaces.size(); ++k) {
+        peers[k].push_back(
+            peer_->trace(rays.rays, rays.any_hit, interfaces[k], options_.threads, nullptr));
+      }
+    }
+    report(rays, own, interfaces, peers, rows);
+    return true;
+  }
+
+  void report(const Rays& rays, const std::vector<double>& own,
+              const std::vector<EmbreePeer::Interface>& interfaces,
+              const std::vector<std::vector<double>>& peers, nlohmann::json& rows) const {
+    const auto mrays = [&](double seconds) {
+      return seconds > 0.0 ? static_cast<double>(rays.rays.size()) / seconds * 1e-6 : 0.0;
+    };
+    const Spread spread = spread_of(own);
+    nlohmann::json row = {{"scene", name_},
+                          {"set", bench::name_of(rays.set)},
+                          {"device", "cpu"},
+                          {"threads", options_.threads},
+                          {"rays", rays.rays.size()},
+                          {"mrays_per_s", mrays(spread.median)},
+                          {"mrays_per_s_lowest", mrays(spread.highest)},
+                          {"mrays_per_s_highest", mrays(spread.lowest)}};
+    std::string line = fmt::format("{:<24} {:<8} {:8.2f} [{:.2f}, {:.2f}] Mrays/s", name_,
+                                   bench::name_of(rays.set), mrays(spread.median),
+                                   mrays(spread.highest), mrays(spread.lowest));
+    double best = 0.0;
+    for (std::size_t k = 0; k < interfaces.size(); ++k) {
+      const double rate = mrays(spread_of(peers[k]).median);
+      row["peer_" + std::string(name_of(interfaces[k])) + "_mrays_per_s"] = rate;
+      if (rate > best) {
+        best = rate;
+        row["peer_interface"] = name_of(interfaces[k]);
+      }
+    }
+    if (best > 0.0) {
+      row["peer"] = "embree";
+      row["peer_mrays_per_s"] = best;
+      row["ratio"] = mrays(spread.median) / best;
+      line += fmt::format(", Embree {:.2f} ({}), ratio {:.2f}", best,
+                          row["peer_interface"].get<std::string>(), mrays(spread.median) / best);
+    }
+    fmt::print("{}\n", line);
+    std::fflush(stdout);
+    rows.push_back(row);
+  }
+
+  const Options& options_;
+  std::string name_;
+  scene::Scene scene_;
+  octree::Octree octree_;
+  std::optional<EmbreePeer> peer_;
+};
+
+int run(const Options& options) {
+  int width = 0, height = 0;
+  if (std::sscanf(options.size.c_str(), "%dx%d", &width, &height) != 2 || width < 1 || height < 1) {
+    fmt::print(stderr, "octrace-bench: --size needs WxH\n");
+    return 2;
+  }
+  nlohmann::json rows = nlohmann::json::array();
+  for (const std::string& name : options.scenes) {
+    util::Result<scene::Scene> scene = load_scene(name);
+    if (!scene) return fail(scene.error());
+    util::Result<scene::Camera> camera =
+        choose_camera(*scene, options.camera, double(width) / height);
+    if (!camera) return fail(camera.error());
+    octree::BuildOptions build;
+    build.builder = options.builder == "median" ? octree::Builder::median : octree::Builder::sah;
+    util::Result<octree::Octree> octree = octree::build(*scene, build);
+    if (!octree) return fail(octree.error());
+    SceneBench bench(options, name.substr(name.find_last_of('/') + 1), std::move(*scene),
+                     std::move(*octree));
+    if (!bench.run(scene::make_ray_camera(*camera, width, height), width, height, rows)) return 1;
+  }
+  return write_json(options.json, rows);
+}
+
+}  // namespace
+
+void add_rays_command(CLI::App& app, int& exit_code) {
+  auto options = std::make_shared<Options>();
+  CLI::App* command = app.add_subcommand("rays", "Mrays/s of primary, bounce and ao rays");
+  command->add_option("--scene", options->scenes, "Scene file or builtin:NAME; may be repeated")
+      ->required();
+  command->add_option("--camera", options->camera, "Name of a camera of the scene");
+  command->add_option("--size", options->size, "Size of the primary image, WxH")
+      ->capture_default_str();
+  command->add_option("--sets", options->sets, "Ray sets")
+      ->delimiter(',')
+      ->check(CLI::IsMember({"primary", "bounce", "ao"}));
+  command->add_option("--threads", options->threads, "CPU threads")
+      ->check(CLI::Range(1u, 4096u))
+      ->capture_default_str();
+  command->add_option("--builder", options->builder, "Octree builder")
+      ->check(CLI::IsMember({"median", "sah"}))
+      ->capture_default_str();
+  command->add_option("--repeats", options->repeats, "Timed runs a row")
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str();
+  command->add_option("--peer", options->peer, "Trace the same rays with this library, turn about")
+      ->check(CLI::IsMember({"embree"}));
+  command->add_option("--json", options->json, "Write the rows to this file");
+  command->callback([options, &exit_code] { exit_code = run(*options); });
+}
+
+}  // namespace octrace::bench

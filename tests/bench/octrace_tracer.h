@@ -1,0 +1,18 @@
+// octrace over a buffer of rays, timed.
+#pragma once
+
+#include <vector>
+
+#include "backend/octree/octree.h"
+#include "backend/scene/scene.h"
+#include "kernels/ray.h"
+
+namespace octrace::bench {
+
+// Seconds on `threads` CPU threads; hits are written where the pointer is not null. Any-hit queries
+// set triangle to 0 where something was hit. Geometry only: no culling, no alpha.
+double trace_cpu(const scene::Scene& scene, const octree::Octree& octree,
+                 const std::vector<kernels::Ray>& rays, bool any_hit, unsigned threads,
+                 std::vector<kernels::Hit>* hits);
+
+}  // namespace octrace::bench
