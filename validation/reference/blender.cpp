@@ -46,13 +46,13 @@ util::Result<std::vector<util::Result<Planes>>> run_blender(const BlenderJob& jo
   for (const BlenderView& view : job.views) {
     auto image = read_output(view.output, view.width, view.height, options.limits);
     if (image) {
-      planes.push_back(planes_from_image(*image, view.output));
+      planes.emplace_back(planes_from_image(*image, view.output));
       continue;
     }
     util::Error error = failed ? failure : image.error();
     if (failed && !reasons.empty()) error.message = reasons + "\n" + error.message;
     if (!failed) error.message = fmt::format("Blender ({}): {}", options.program, error.message);
-    planes.push_back(std::move(error));
+    planes.emplace_back(std::move(error));
   }
   return planes;
 }
