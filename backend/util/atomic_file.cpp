@@ -11,6 +11,8 @@
 #include <cstring>
 #include <filesystem>
 
+#include "backend/util/interrupt.h"
+
 namespace octrace::util {
 
 namespace {
@@ -67,6 +69,7 @@ AtomicFile::~AtomicFile() {
 }
 
 Result<void> AtomicFile::commit() {
+  if (interrupt_flag()) return Error{Exit::io, "", "not written: interrupted", target_, ""};
   const int descriptor = ::open(temporary_.c_str(), O_RDONLY | O_CLOEXEC);
   if (descriptor < 0) return io_error(target_, "cannot be reopened", errno);
   const int flushed = ::fsync(descriptor);

@@ -19,7 +19,8 @@ class AtomicFile {
 
   // Keeps the target's extension, because image writers choose their format by it.
   const std::string& temporary() const { return temporary_; }
-  Result<void> commit();  // fsync, rename, fsync of the folder
+  // fsync, rename, fsync of the folder. Refused after an interrupt (interrupt.h).
+  Result<void> commit();
 
  private:
   AtomicFile(std::string target, std::string temporary)

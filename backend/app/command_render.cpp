@@ -1,0 +1,311 @@
+#include <fmt/format.h>
+
+#include <cmath>
+#include <filesystem>
+#include <map>
+#include <memory>
+
+#include "backend/app/camera_choice.h"
+#include "backend/app/command.h"
+#include "backend/app/options.h"
+#include "backend/app/output.h"
+#include "backend/app/progress.h"
+#include "backend/app/render_stats.h"
+#include "backend/image/image.h"
+#include "backend/render/renderer.h"
+#include "backend/util/interrupt.h"
+#include "backend/util/log.h"
+#include "backend/util/process.h"
+#include "backend/util/version.h"
+
+namespace octrace::app {
+
+namespace {
+
+enum class Device { automatic, cpu, cuda };
+
+struct RenderOptions {
+  SceneRequest scene;
+  std::vector<std::string> outputs;
+  std::optional<std::string> aovs;
+  std::string camera, size = "1280x720", sky, stats;
+  kernels::RenderParams params;
+  std::uint32_t tile = 16;
+  double depth_scale = 1000.0;
+  Device device = Device::automatic;
+  ProgressMode progress = ProgressMode::automatic;
+};
+
+constexpr const char* kHelp = R"(Files:
+  NAME.exr        every AOV of --aov, 32-bit float and UINT, in one file
+  NAME.png .tif   one AOV: beauty, unless --aov names exactly one
+  NAME.jpg        the same, 8-bit AOVs only
+  FILE:AOV        this AOV, whatever --aov says: -o depth.png:Z; an .exr takes a list, a.exr:Z,mask
+PNG, TIFF and JPEG hold beauty and albedo in sRGB, normals from [-1, 1], masks, uv and barycentric
+from [0, 1], ids as 16-bit numbers, depth and distance as 16-bit numbers: metres * --depth-scale, 65535
+where nothing is hit or it does not fit.
+
+Cameras: --camera takes a name or an index of the scene's cameras (octrace info lists them), or a
+file: {"type": "perspective", "yfov": 0.7, "matrix": [16 numbers, camera to world, by columns]};
+"orthographic" with xmag and ymag; "pinhole" with fx, fy, cx, cy in pixels; znear and zfar optional.
+
+Examples:
+  octrace render builtin:default -o picture.png
+  octrace render scene.glb -o frame.exr --aov beauty,Z,N,mask --spp 64 --size 1920x1080
+  octrace render scene.glb -o depth.png:Z -o mask.png:mask --camera 0 --stats stats.json)";
+
+void declare_view(CLI::App& command, RenderOptions& options) {
+  command
+      .add_option("-o,--output", options.outputs,
+                  "image to write, .exr .png .tif or .jpg; may be repeated")
+      ->required()
+      ->allow_extra_args(false)
+      ->type_name("FILE[:AOV]");
+  command
+      .add_option(
+          "--aov", options.aovs,
+          fmt::format("planes to render, by comma, or all: {} [beauty]", render::aov_names()))
+      ->type_name("LIST");
+  command
+      .add_option("--camera", options.camera,
+                  "which camera [the scene's first, else one that frames the bounds]")
+      ->type_name("NAME|INDEX|FILE.json");
+  command.add_option("--size", options.size, "pixels [1280x720]")->type_name("WxH");
+  command.add_option("--spp", options.params.spp, "samples a pixel, for beauty only [16]")
+      ->type_name("N");
+  command.add_option("--seed", options.params.seed, "of the samples [0]")->type_name("N");
+  command
+      .add_option("--sky", options.sky,
+                  fmt::format("radiance of the sky, linear [{},{},{}]", options.params.sky.x,
+                              options.params.sky.y, options.params.sky.z))
+      ->type_name("R,G,B");
+  command
+      .add_option("--background", options.params.transparent_background,
+                  "what beauty shows where nothing is hit [sky]")
+      ->transform(CLI::CheckedTransformer(
+          std::map<std::string, std::uint32_t>{{"sky", 0}, {"transparent", 1}}))
+      ->type_name("sky|transparent");
+  command
+      .add_option("--cull", options.params.cull,
+                  "back faces: spec culls them as doubleSided says; none shows all [spec]")
+      ->transform(
+          CLI::CheckedTransformer(std::map<std::string, std::uint32_t>{{"none", 0}, {"spec", 1}}))
+      ->type_name("spec|none");
+  command
+      .add_option("--alpha", options.params.alpha,
+                  "spec follows alphaMode; ignore makes everything opaque [spec]")
+      ->transform(
+          CLI::CheckedTransformer(std::map<std::string, std::uint32_t>{{"ignore", 0}, {"spec", 1}}))
+      ->type_name("spec|ignore");
+  command
+      .add_option("--depth-scale", options.depth_scale,
+                  "units a metre of 16-bit depth; 1000: millimetres, up to 65.534 m [1000]")
+      ->check(CLI::PositiveNumber)
+      ->type_name("S");
+}
+
+void declare_running(CLI::App& command, RenderOptions& options) {
+  command.add_option("--device", options.device, "where to trace; auto takes the CPU [auto]")
+      ->transform(CLI::CheckedTransformer(std::map<std::string, Device>{
+          {"auto", Device::automatic}, {"cpu", Device::cpu}, {"cuda", Device::cuda}}))
+      ->type_name("auto|cpu|cuda");
+  command
+      .add_option("--tile", options.tile,
+                  "pixels a side of what a thread takes at once. Never changes the image [16]")
+      ->check(CLI::Range(1, 4096))
+      ->type_name("N");
+  command
+      .add_option("--stats", options.stats,
+                  "write times, rays, octree figures and memory to this JSON file")
+      ->type_name("FILE.json");
+  command
+      .add_option("--progress", options.progress,
+                  "on standard error; auto: a bar on a terminal, nothing when piped; json: a line "
+                  "each [auto]")
+      ->transform(CLI::CheckedTransformer(
+          std::map<std::string, ProgressMode>{{"auto", ProgressMode::automatic},
+                                              {"bar", ProgressMode::bar},
+                                              {"json", ProgressMode::json},
+                                              {"none", ProgressMode::none}}))
+      ->type_name("auto|bar|json|none");
+}
+
+util::Result<kernels::Vec3> parse_sky(const std::string& text) {
+  kernels::Vec3 sky;
+  std::size_t begin = 0;
+  for (int c = 0; c < 3; ++c) {
+    const std::size_t comma = text.find(',', begin);
+    const bool last = comma == std::string::npos;
+    float value = 0.0f;
+    const bool number =
+        CLI::detail::lexical_cast(text.substr(begin, last ? last : comma - begin), value);
+    if (!number || last != (c == 2) || !std::isfinite(value) || value < 0.0f) {
+      return usage_error(
+          fmt::format("--sky: '{}' is not three numbers of 0 or more, such as 0.5,0.6,0.7", text));
+    }
+    sky[c] = value;
+    begin = comma + 1;
+  }
+  return sky;
+}
+
+// What the arguments mean, with everything checked that can be checked before any work.
+struct Plan {
+  ImageSize size;
+  std::vector<Output> outputs;
+  render::AovSet aovs;
+  std::optional<scene::Camera> camera_file;
+};
+
+util::Result<Plan> make_plan(RenderOptions& options) {
+  Plan plan;
+  const util::Limits& limits = options.scene.limits;
+  util::Result<ImageSize> size = parse_size(options.size, limits);
+  if (!size) return size.error();
+  plan.size = *size;
+  util::Result<std::vector<Output>> outputs =
+      plan_outputs(options.outputs, options.aovs, plan.size);
+  if (!outputs) return outputs.error();
+  plan.outputs = std::move(*outputs);
+  plan.aovs = needed_aovs(plan.outputs);
+  if (options.params.spp == 0) return usage_error("--spp: at least 1 is needed");
+  if (options.params.spp > limits.max_spp) {
+    return util::Error{
+        util::Exit::limit, "",
+        fmt::format("--spp {}: --max-spp allows {}", options.params.spp, limits.max_spp), "", ""};
+  }
+  if (!std::isfinite(options.depth_scale)) return usage_error("--depth-scale: must be finite");
+  if (!options.sky.empty()) {
+    util::Result<kernels::Vec3> sky = parse_sky(options.sky);
+    if (!sky) return sky.error();
+    options.params.sky = *sky;
+  }
+  if (options.device == Device::cuda) {
+    return util::Error{util::Exit::unsupported, "",
+                       "--device cuda: this octrace was built without CUDA", "", ""};
+  }
+  if (options.camera.ends_with(".json")) {
+    util::Result<scene::Camera> camera = scene::read_camera_file(options.camera);
+    if (!camera) return camera.error();
+    plan.camera_file = std::move(*camera);
+  }
+  for (const Output& output : plan.outputs) {
+    util::Result<void> writable = check_writable(output.path);
+    if (!writable) return writable.error();
+  }
+  if (!options.stats.empty()) {
+    util::Result<void> writable = check_writable(options.stats);
+    if (!writable) return writable.error();
+  }
+  return plan;
+}
+
+bool needs_textures(const render::AovSet& aovs) {
+  for (const kernels::Aov aov :
+       {kernels::Aov::beauty, kernels::Aov::albedo, kernels::Aov::normal}) {
+    if (aovs.test(static_cast<std::size_t>(aov))) return true;
+  }
+  return false;
+}
+
+Metadata make_metadata(const RenderOptions& options, const scene::Camera& camera) {
+  return {{"octrace:version", util::version()},
+          {"octrace:scene", options.scene.source},
+          {"octrace:camera", camera_json(camera)}};
+}
+
+util::Result<render::TraceStats> trace(const RenderOptions& options, const SceneSession& session,
+                                       const scene::Camera& camera, Progress& progress,
+                                       render::Framebuffer& framebuffer) {
+  const std::unique_ptr<render::Renderer> renderer =
+      render::make_cpu_renderer(session.scene, session.octree);
+  render::Settings settings;
+  settings.params = options.params;
+  settings.threads = options.scene.build.threads;
+  settings.tile = options.tile;
+  settings.progress = [&](double share) { progress.update(share); };
+  settings.cancel = &util::interrupt_flag();
+  return renderer->render(scene::make_ray_camera(camera, static_cast<int>(framebuffer.width()),
+                                                 static_cast<int>(framebuffer.height())),
+                          settings, framebuffer);
+}
+
+util::Result<void> write_outputs(const RenderOptions& options, const Plan& plan,
+                                 const Metadata& metadata, const render::Framebuffer& framebuffer,
+                                 Progress& progress) {
+  util::Result<void> threads = image::set_threads(options.scene.build.threads);
+  if (!threads) return threads;
+  for (std::size_t i = 0; i < plan.outputs.size(); ++i) {
+    progress.update(static_cast<double>(i) / static_cast<double>(plan.outputs.size()));
+    util::Result<void> written =
+        write_output(plan.outputs[i], framebuffer, options.depth_scale, metadata);
+    if (!written) return written;
+    util::log_verbose(fmt::format("wrote {}", plan.outputs[i].path));
+  }
+  return {};
+}
+
+util::Result<util::Exit> run_render(RenderOptions options) {
+  RenderStats stats;
+  util::Result<Plan> plan = make_plan(options);
+  if (!plan) return plan.error();
+  image::preload();
+  Progress progress(options.progress);
+
+  progress.stage("load");
+  options.scene.need_textures = needs_textures(plan->aovs);
+  util::Result<std::unique_ptr<SceneSession>> session = open_scene(options.scene);
+  if (!session) return session.error();
+  const double aspect =
+      static_cast<double>(plan->size.width) / static_cast<double>(plan->size.height);
+  util::Result<scene::Camera> camera =
+      plan->camera_file ? util::Result<scene::Camera>(*plan->camera_file)
+                        : choose_camera(options.camera, (*session)->scene, aspect);
+  if (!camera) return camera.error();
+
+  const util::InterruptGuard interruptible;
+  progress.stage("trace");
+  const util::Timer trace_timer;
+  render::Framebuffer framebuffer(plan->size.width, plan->size.height, plan->aovs);
+  util::Result<render::TraceStats> traced =
+      trace(options, **session, *camera, progress, framebuffer);
+  if (!traced) return traced.error();
+  stats.trace = *traced;
+  stats.trace_ms = trace_timer.milliseconds();
+
+  progress.stage("write");
+  const util::Timer write_timer;
+  util::Result<void> written =
+      write_outputs(options, *plan, make_metadata(options, *camera), framebuffer, progress);
+  if (!written) return written.error();
+  stats.write_ms = write_timer.milliseconds();
+  progress.finish();
+
+  stats.width = plan->size.width;
+  stats.height = plan->size.height;
+  stats.camera = camera->name;
+  stats.spp = options.params.spp;
+  stats.builder = options.scene.build.builder;
+  for (const Output& output : plan->outputs) stats.outputs.push_back(output.path);
+  if (!options.stats.empty()) {
+    util::Result<void> saved = write_stats(options.stats, stats, **session);
+    if (!saved) return saved.error();
+  }
+  util::log_info(summary(stats, **session));
+  return util::Exit::ok;
+}
+
+}  // namespace
+
+void declare_render(CLI::App& program, Run& chosen) {
+  auto options = std::make_shared<RenderOptions>();
+  CLI::App* command = program.add_subcommand("render", "render one view of a scene to image files");
+  command->footer(kHelp);
+  add_scene_options(*command, options->scene);
+  declare_view(*command, *options);
+  declare_running(*command, *options);
+  add_verbosity_options(*command);
+  command->callback([options, &chosen] { chosen = [options] { return run_render(*options); }; });
+}
+
+}  // namespace octrace::app

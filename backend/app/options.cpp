@@ -1,0 +1,122 @@
+#include "backend/app/options.h"
+
+#include <fmt/format.h>
+
+#include <charconv>
+#include <map>
+
+#include "backend/util/log.h"
+
+namespace octrace::app {
+
+namespace {
+
+constexpr const char* kTuning = "Octree";
+constexpr const char* kLimits = "Limits (exceeding one is exit code 6)";
+
+// Digits only, the whole text.
+std::optional<std::uint32_t> parse_count(std::string_view text) {
+  std::uint32_t value = 0;
+  const char* end = text.data() + text.size();
+  const auto [stop, error] = std::from_chars(text.data(), end, value);
+  if (error != std::errc() || stop != end || text.empty()) return std::nullopt;
+  return value;
+}
+
+void add_limit(CLI::App& command, const std::string& name, std::uint64_t& value,
+               const std::string& help, bool bytes) {
+  CLI::Option* option =
+      command.add_option(name, value, help)->group(kLimits)->capture_default_str();
+  if (bytes) option->transform(CLI::AsSizeValue(false));
+}
+
+}  // namespace
+
+util::Error usage_error(const std::string& message) {
+  return {util::Exit::usage, "", message, "", ""};
+}
+
+void add_scene_options(CLI::App& command, SceneRequest& request) {
+  command
+      .add_option(
+          "SCENE", request.source,
+          "a .gltf or .glb file, or builtin:default, builtin:paper, builtin:terrain[:QUADS], "
+          "builtin:soup[:TRIANGLES]")
+      ->required();
+  command.add_option("--scene", request.scene, "index of the glTF scene [the file's default]")
+      ->check(CLI::NonNegativeNumber);
+  command
+      .add_option("--missing-images", request.missing_images_warn,
+                  "a missing or broken texture: error, or warn and use the material's factor alone "
+                  "[error]")
+      ->transform(
+          CLI::CheckedTransformer(std::map<std::string, bool>{{"error", false}, {"warn", true}}))
+      ->type_name("error|warn");
+  command
+      .add_option("--threads", request.build.threads,
+                  "threads to use; 0: all cores. Never changes the result [0]")
+      ->check(CLI::Range(0, 4096))
+      ->type_name("N");
+  command
+      .add_option("--builder", request.build.builder,
+                  "sah: surface-area heuristic; median: the paper's. Never changes the image [sah]")
+      ->transform(CLI::CheckedTransformer(std::map<std::string, octree::Builder>{
+          {"median", octree::Builder::median}, {"sah", octree::Builder::sah}}))
+      ->type_name("median|sah")
+      ->group(kTuning);
+  command
+      .add_option("--leaf", request.build.leaf,
+                  "most vertices (median) or triangles (sah) in a leaf [8, 3]")
+      ->check(CLI::Range(1, 1 << 20))
+      ->type_name("N")
+      ->group(kTuning);
+  command
+      .add_flag("--verify", request.verify,
+                "check every invariant of the built octree; a violation is exit code 7")
+      ->group(kTuning);
+  add_limit_options(command, request.limits);
+}
+
+void add_limit_options(CLI::App& command, util::Limits& limits) {
+  add_limit(command, "--max-file-bytes", limits.max_file_bytes, "any one file read", true);
+  add_limit(command, "--max-json-bytes", limits.max_json_bytes, "a glTF's JSON", true);
+  add_limit(command, "--max-json-depth", limits.max_json_depth, "nesting of JSON values", false);
+  add_limit(command, "--max-scene-bytes", limits.max_scene_bytes, "flattened scene and octree",
+            true);
+  add_limit(command, "--max-triangles", limits.max_triangles, "with every instance counted", false);
+  add_limit(command, "--max-nodes", limits.max_nodes, "glTF nodes in a file", false);
+  add_limit(command, "--max-texture-pixels", limits.max_texture_pixels, "one texture", false);
+  add_limit(command, "--max-image-pixels", limits.max_image_pixels, "the rendered image", false);
+  add_limit(command, "--max-spp", limits.max_spp, "samples a pixel", false);
+}
+
+void add_verbosity_options(CLI::App& command) {
+  CLI::Option* quiet = command.add_flag_callback(
+      "--quiet", [] { util::set_verbosity(util::Verbosity::quiet); }, "errors only");
+  command
+      .add_flag_callback(
+          "--verbose", [] { util::set_verbosity(util::Verbosity::verbose); },
+          "say what is being done")
+      ->excludes(quiet);
+}
+
+util::Result<ImageSize> parse_size(const std::string& text, const util::Limits& limits) {
+  const std::size_t cross = text.find('x');
+  const auto width = parse_count(std::string_view(text).substr(0, cross));
+  const auto height = cross == std::string::npos
+                          ? std::nullopt
+                          : parse_count(std::string_view(text).substr(cross + 1));
+  if (!width || !height || *width == 0 || *height == 0) {
+    return usage_error(fmt::format("--size: '{}' is not WxH in pixels, such as 1280x720", text));
+  }
+  const std::uint64_t pixels = static_cast<std::uint64_t>(*width) * *height;
+  if (pixels > limits.max_image_pixels || *width > 0x7fffffffu || *height > 0x7fffffffu) {
+    return util::Error{util::Exit::limit, "",
+                       fmt::format("--size {}: {} pixels, --max-image-pixels allows {}", text,
+                                   pixels, limits.max_image_pixels),
+                       "", ""};
+  }
+  return ImageSize{*width, *height};
+}
+
+}  // namespace octrace::app

@@ -1,0 +1,201 @@
+#include "backend/app/output.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <set>
+
+#include "backend/util/atomic_file.h"
+
+namespace octrace::app {
+
+namespace {
+
+using kernels::Aov;
+
+std::optional<FileKind> kind_of(const std::string& path) {
+  std::string extension = std::filesystem::path(path).extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  if (extension == ".exr") return FileKind::exr;
+  if (extension == ".png") return FileKind::png;
+  if (extension == ".tif" || extension == ".tiff") return FileKind::tiff;
+  if (extension == ".jpg" || extension == ".jpeg") return FileKind::jpeg;
+  return std::nullopt;
+}
+
+// Nothing for positions, whose values no integer format holds.
+std::optional<image::Encoding> encoding_of(Aov aov) {
+  switch (aov) {
+    case Aov::beauty:
+    case Aov::albedo:
+      return image::Encoding::srgb8;
+    case Aov::depth:
+    case Aov::distance:
+      return image::Encoding::scaled16;
+    case Aov::normal:
+    case Aov::geometric_normal:
+      return image::Encoding::signed8;
+    case Aov::uv:
+    case Aov::barycentric:
+    case Aov::mask:
+      return image::Encoding::linear8;
+    case Aov::object_id:
+    case Aov::material_id:
+    case Aov::primitive_id:
+      return image::Encoding::index16;
+    case Aov::position:
+      break;
+  }
+  return std::nullopt;
+}
+
+Aov only_aov(const render::AovSet& set) {
+  for (const render::AovInfo& info : render::aov_table()) {
+    if (set.test(static_cast<std::size_t>(info.aov))) return info.aov;
+  }
+  return Aov::beauty;
+}
+
+render::AovSet beauty_only() {
+  render::AovSet set;
+  set.set(static_cast<std::size_t>(Aov::beauty));
+  return set;
+}
+
+util::Result<void> check_integer_output(const Output& output, const ImageSize& size) {
+  if (output.aovs.count() != 1) {
+    return usage_error(fmt::format("-o {}: this format holds one AOV, {} were named", output.path,
+                                   output.aovs.count()));
+  }
+  const render::AovInfo& info = render::aov_info(only_aov(output.aovs));
+  const std::optional<image::Encoding> encoding = encoding_of(info.aov);
+  if (!encoding) {
+    return usage_error(
+        fmt::format("-o {}: {} needs floating point: use .exr", output.path, info.option));
+  }
+  const bool words =
+      *encoding == image::Encoding::scaled16 || *encoding == image::Encoding::index16;
+  if (output.kind == FileKind::jpeg && words) {
+    return usage_error(fmt::format("-o {}: {} needs 16 bits, a JPEG has 8: use .exr, .png or .tif",
+                                   output.path, info.option));
+  }
+  const std::uint32_t longest = std::max(size.width, size.height);
+  const std::uint32_t allowed = output.kind == FileKind::jpeg ? 65500 : 1000000;
+  if (longest > allowed) {
+    return usage_error(fmt::format("-o {}: {}x{} pixels, this format takes {} a side: use .exr",
+                                   output.path, size.width, size.height, allowed));
+  }
+  return {};
+}
+
+struct Argument {
+  std::string path;
+  std::optional<std::string> aovs;
+};
+
+Argument split_argument(const std::string& text) {
+  const std::size_t colon = text.rfind(':');
+  if (colon == std::string::npos || text.find_first_of("./", colon) != std::string::npos) {
+    return {text, std::nullopt};
+  }
+  return {text.substr(0, colon), text.substr(colon + 1)};
+}
+
+util::Result<Output> plan_output(const std::string& argument, const render::AovSet& listed,
+                                 const ImageSize& size) {
+  const Argument split = split_argument(argument);
+  const std::optional<FileKind> kind = kind_of(split.path);
+  if (!kind) {
+    return usage_error(
+        fmt::format("-o {}: the name must end in .exr, .png, .tif or .jpg", argument));
+  }
+  Output output{split.path, *kind, listed};
+  if (split.aovs) {
+    util::Result<render::AovSet> named = render::parse_aovs(*split.aovs);
+    if (!named) return named.error();
+    output.aovs = *named;
+  } else if (*kind != FileKind::exr && listed.count() != 1) {
+    output.aovs = beauty_only();
+  }
+  if (*kind != FileKind::exr) {
+    util::Result<void> checked = check_integer_output(output, size);
+    if (!checked) return checked.error();
+  }
+  return output;
+}
+
+void add_channels(const render::Framebuffer& framebuffer, Aov aov, image::ImageView& view) {
+  const render::AovInfo& info = render::aov_info(aov);
+  const auto count = static_cast<std::size_t>(info.channel_count);
+  const auto* data = info.uint32
+                         ? reinterpret_cast<const unsigned char*>(framebuffer.uints(aov).data())
+                         : reinterpret_cast<const unsigned char*>(framebuffer.floats(aov).data());
+  for (std::size_t c = 0; c < count; ++c) {
+    view.channels.push_back({std::string(info.channels[c]),
+                             info.uint32 ? image::SampleType::uint32 : image::SampleType::float32,
+                             data + c * 4, count * 4});
+  }
+}
+
+}  // namespace
+
+util::Result<std::vector<Output>> plan_outputs(const std::vector<std::string>& arguments,
+                                               const std::optional<std::string>& aov_list,
+                                               const ImageSize& size) {
+  render::AovSet listed = beauty_only();
+  if (aov_list) {
+    util::Result<render::AovSet> parsed = render::parse_aovs(*aov_list);
+    if (!parsed) return parsed.error();
+    listed = *parsed;
+  }
+  std::vector<Output> outputs;
+  std::set<std::filesystem::path> seen;
+  for (const std::string& argument : arguments) {
+    util::Result<Output> output = plan_output(argument, listed, size);
+    if (!output) return output.error();
+    if (!seen.insert(std::filesystem::path(output->path).lexically_normal()).second) {
+      return usage_error(fmt::format("-o {}: this file is named twice", output->path));
+    }
+    outputs.push_back(std::move(*output));
+  }
+  const render::AovSet homeless = aov_list ? listed & ~needed_aovs(outputs) : render::AovSet();
+  if (homeless.any()) {
+    return usage_error(fmt::format(
+        "--aov asks for {}, and no -o holds it: add an .exr, or name it as in -o FILE.png:{}",
+        render::aov_info(only_aov(homeless)).option, render::aov_info(only_aov(homeless)).option));
+  }
+  return outputs;
+}
+
+render::AovSet needed_aovs(const std::vector<Output>& outputs) {
+  render::AovSet needed;
+  for (const Output& output : outputs) needed |= output.aovs;
+  return needed;
+}
+
+util::Result<void> check_writable(const std::string& path) {
+  util::Result<util::AtomicFile> probe = util::AtomicFile::create(path);
+  if (!probe) return probe.error();
+  return {};
+}
+
+util::Result<void> write_output(const Output& output, const render::Framebuffer& framebuffer,
+                                double depth_scale, const Metadata& metadata) {
+  image::ImageView view{framebuffer.width(), framebuffer.height(), {}, metadata};
+  for (const render::AovInfo& info : render::aov_table()) {
+    if (output.aovs.test(static_cast<std::size_t>(info.aov))) {
+      add_channels(framebuffer, info.aov, view);
+    }
+  }
+  if (output.kind == FileKind::exr) return image::write_exr(output.path, view);
+  const Aov aov = only_aov(output.aovs);
+  const image::Encoding encoding = *encoding_of(aov);
+  if (encoding == image::Encoding::scaled16) {
+    view.metadata.emplace_back("octrace:depth_scale", fmt::format("{}", depth_scale));
+  }
+  return image::write_integer(output.path, view, encoding, depth_scale);
+}
+
+}  // namespace octrace::app

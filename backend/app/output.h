@@ -1,0 +1,42 @@
+// The image files that a render writes, and what goes into each.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "backend/app/options.h"
+#include "backend/image/image.h"
+#include "backend/render/framebuffer.h"
+#include "backend/util/result.h"
+
+namespace octrace::app {
+
+enum class FileKind { exr, png, tiff, jpeg };
+
+struct Output {
+  std::string path;
+  FileKind kind = FileKind::exr;
+  render::AovSet aovs;  // one, but for an EXR
+};
+
+// The arguments of -o: PATH, or PATH:AOV[,AOV...]. The text after the last colon names AOVs when it
+// holds neither '.' nor '/'. An EXR without names holds those of --aov (default beauty); a PNG,
+// TIFF or JPEG holds the one that --aov names, where that is one, else beauty. Usage errors: an
+// unknown extension or AOV, a plane that the format cannot hold, a path given twice, an AOV asked
+// for by
+// --aov that no file holds.
+util::Result<std::vector<Output>> plan_outputs(const std::vector<std::string>& arguments,
+                                               const std::optional<std::string>& aov_list,
+                                               const ImageSize& size);
+
+render::AovSet needed_aovs(const std::vector<Output>& outputs);
+
+// Exit 5 where a file could not be created; nothing stays behind.
+util::Result<void> check_writable(const std::string& path);
+
+using Metadata = std::vector<std::pair<std::string, std::string>>;
+util::Result<void> write_output(const Output& output, const render::Framebuffer& framebuffer,
+                                double depth_scale, const Metadata& metadata);
+
+}  // namespace octrace::app

@@ -1,0 +1,61 @@
+#include "backend/app/render_stats.h"
+
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+
+#include "backend/app/octree_json.h"
+#include "backend/util/atomic_file.h"
+#include "backend/util/version.h"
+
+namespace octrace::app {
+
+using nlohmann::ordered_json;
+
+util::Result<void> write_stats(const std::string& path, const RenderStats& stats,
+                               const SceneSession& session) {
+  const scene::Scene& scene = session.scene;
+  ordered_json json;
+  json["octrace"] = util::version();
+  json["device"] = stats.trace.device;
+  json["scene"] = {{"source", session.source},
+                   {"triangles", scene.triangles.size()},
+                   {"vertices", scene.positions.size()},
+                   {"geometries", scene.geometries.size()},
+                   {"materials", scene.materials.size()},
+                   {"textures", scene.textures.size()},
+                   {"lights", scene.lights.size()},
+                   {"cameras", scene.cameras.size()},
+                   {"bytes", scene.bytes()}};
+  json["image"] = {{"width", stats.width},
+                   {"height", stats.height},
+                   {"spp", stats.spp},
+                   {"camera", stats.camera},
+                   {"outputs", stats.outputs}};
+  json["rays"] = {{"camera", stats.trace.camera_rays},
+                  {"beauty", stats.trace.beauty_rays},
+                  {"shadow", stats.trace.shadow_rays},
+                  {"total", stats.rays()}};
+  json["mrays_per_s"] = stats.mrays_per_s();
+  json["ms"] = {{"load", session.load_ms},     {"build", session.build_ms},
+                {"verify", session.verify_ms}, {"trace", stats.trace_ms},
+                {"write", stats.write_ms},     {"total", stats.total.milliseconds()}};
+  json["octree"] = octree_json(octree::statistics(session.octree));
+  json["octree"]["builder"] = stats.builder == octree::Builder::sah ? "sah" : "median";
+  json["peak_rss_bytes"] = util::peak_resident_bytes();
+  return util::write_file(path, json.dump(2) + "\n");
+}
+
+std::string summary(const RenderStats& stats, const SceneSession& session) {
+  std::string names;
+  for (const std::string& output : stats.outputs) {
+    names += (names.empty() ? "" : ", ") + output;
+  }
+  return fmt::format(
+      "{}: {} triangles, load {:.0f} ms, build {:.0f} ms, trace {:.0f} ms ({:.1f} Mrays/s), write "
+      "{:.0f} ms",
+      names, session.scene.triangles.size(), session.load_ms, session.build_ms, stats.trace_ms,
+      stats.mrays_per_s(), stats.write_ms);
+}
+
+}  // namespace octrace::app

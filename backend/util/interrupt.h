@@ -1,0 +1,22 @@
+// Ctrl-C and the like while there is work to stop in good order. Outside of that the default action
+// stands: the process ends at once, and there is nothing to clean up.
+#pragma once
+
+#include <atomic>
+
+namespace octrace::util {
+
+// Between construction and destruction SIGINT, SIGTERM and SIGHUP set a flag instead of ending the
+// process; a second one ends it.
+class InterruptGuard {
+ public:
+  InterruptGuard();
+  ~InterruptGuard();
+  InterruptGuard(const InterruptGuard&) = delete;
+  InterruptGuard& operator=(const InterruptGuard&) = delete;
+};
+
+const std::atomic<bool>& interrupt_flag();
+int interrupt_signal();  // the signal's number; 0: none came
+
+}  // namespace octrace::util
