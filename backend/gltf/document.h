@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "backend/gltf/tinygltf.h"
@@ -22,9 +23,9 @@ struct EncodedImage {
 };
 
 struct Document {
-  tinygltf::Model model;            // structure only: its images hold no pixels
+  tinygltf::Model model;  // structure only: its images hold no pixels
   std::vector<EncodedImage> images;
-  std::string file;                 // as the user named it
+  std::string file;  // as the user named it
   std::vector<std::string> warnings;
 
   // Element counts come from model.accessors[i].count.
@@ -40,9 +41,19 @@ struct LoadOptions {
   bool missing_images_warn = false;
 };
 
+// A .gltf or .glb, told apart by content. External files are read from the scene's own folder only.
+// Errors: invalid_input (the Khronos validator's codes), unsupported (an extension or version), io,
+// limit (names the option).
 util::Result<Document> load(const std::string& path, const LoadOptions& options);
 
-// Extensions whose meaning octrace follows; others in extensionsRequired are refused.
+// The same from memory, where no external file can be read; `name` stands in messages.
+util::Result<Document> load_bytes(std::vector<std::uint8_t> bytes, const std::string& name,
+                                  const LoadOptions& options);
+
+// Extensions whose meaning octrace follows.
 std::span<const std::string_view> supported_extensions();
+// Material extensions that are accepted, even where required, with a warning: geometry is exact
+// without them, and surfaces keep glTF's core material. Others in extensionsRequired are refused.
+std::span<const std::string_view> approximated_extensions();
 
 }  // namespace octrace::gltf

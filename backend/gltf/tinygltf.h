@@ -1,10 +1,10 @@
-// tinygltf with its own file and image handling switched off: octrace brings its own callbacks.
+// tinygltf with its own file and image handling compiled out: octrace reads files and images
+// itself.
 #pragma once
 
+#define TINYGLTF_NO_FS
 #define TINYGLTF_NO_STB_IMAGE
 #define TINYGLTF_NO_STB_IMAGE_WRITE
-#define TINYGLTF_NO_INCLUDE_JSON
 #define TINYGLTF_NO_INCLUDE_STB_IMAGE
 #define TINYGLTF_NO_INCLUDE_STB_IMAGE_WRITE
-#include <nlohmann/json.hpp>
 #include <tiny_gltf.h>
