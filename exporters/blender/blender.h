@@ -21,18 +21,19 @@ struct BlenderView {
 };
 
 struct BlenderScene {
-  std::string file;                 // the original .gltf or .glb, absolute or as for output
-  std::optional<int> gltf_scene;    // as --scene N; default: the file's own, else 0, else all nodes
-  bool cull = true, alpha = true;   // as in PovrayOptions
+  std::string file;                // the original .gltf or .glb, absolute or as for output
+  std::optional<int> gltf_scene;   // as --scene N; default: the file's own, else 0, else all nodes
+  bool cull = true, alpha = true;  // as in PovrayOptions
   std::vector<BlenderView> views;
 };
 
-// The encoding of an output: OpenEXR multilayer, 32-bit float, row 0 at the top, one ray through each
-// pixel's centre:
+// The encoding of an output: OpenEXR multilayer, 32-bit float, row 0 at the top, one ray through
+// each pixel's centre:
 //   ViewLayer.Combined.A   mask: exactly 0 or 1 (R, G, B: white where hit)
 //   ViewLayer.Depth.Z      planar depth in metres; 1e10 where nothing is hit
-//   ViewLayer.IndexOB.X    glTF node index + 1 (its low 15 bits: Blender holds no more); 0: background
-//   ViewLayer.Normal.*     shading normal, ViewLayer.Position.*: both in Blender's axes, which are
+//   ViewLayer.IndexOB.X    glTF node index + 1 (its low 15 bits: Blender holds no more); 0:
+//   background ViewLayer.Normal.*     shading normal, ViewLayer.Position.*: both in Blender's axes,
+//   which are
 //                          (x, -z, y) of glTF's
 // The script prints "octrace: rendered PATH" after each image, "octrace: failed FILE: reason" for a
 // scene or view that failed (the others go on), and raises at its end if any did, so that Blender

@@ -1,5 +1,5 @@
-// A flattened scene -> one binary glTF 2.0 file (.glb) in which every transform, skin and morph target
-// is baked into the vertices.
+// A flattened scene -> one binary glTF 2.0 file (.glb) in which every transform, skin and morph
+// target is baked into the vertices.
 #pragma once
 
 #include <string>

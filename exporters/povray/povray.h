@@ -17,15 +17,16 @@ enum class PovrayMode {
 struct PovrayOptions {
   PovrayMode mode = PovrayMode::depth;
   int width = 640, height = 480;
-  bool cull = true;   // back faces of single-sided materials are not there
-  bool alpha = true;  // alpha mode MASK cuts out; BLEND is solid in depth mode, as in octrace's AOVs
+  bool cull = true;  // back faces of single-sided materials are not there
+  bool alpha =
+      true;  // alpha mode MASK cuts out; BLEND is solid in depth mode, as in octrace's AOVs
   kernels::Vec3 sky{0.5f, 0.6f, 0.75f};  // scene mode: radiance of the background, linear
   // The scene has lights of its own; without, scene mode adds one beside the camera.
   int antialias = 0;  // scene mode: +A with this many subdivisions; 0: one ray a pixel
 };
 
-// The encoding of depth mode. The image is a 16-bit RGB PNG without gamma, row 0 at the top, one ray
-// through each pixel's centre. With R, G, B as the stored 16-bit integers:
+// The encoding of depth mode. The image is a 16-bit RGB PNG without gamma, row 0 at the top, one
+// ray through each pixel's centre. With R, G, B as the stored 16-bit integers:
 //   B        object index + 1 (glTF node index + 1), 1 to 65535; 0: nothing was hit (mask 0, and
 //            then R = G = 0 and depth is +infinity)
 //   q        = R * 32768 + G, R and G each below 32768: planar depth in steps of far / 2^30
@@ -37,19 +38,21 @@ inline constexpr int kPovrayHalf = 32768;                  // 2^15
 inline constexpr std::uint32_t kPovrayMaxObjects = 65535;
 
 struct PovrayFile {
-  double depth_far = 0.0;              // depth mode: see above
-  std::vector<std::string> arguments;  // after "povray": renders IMAGE.png from the .pov's own folder
-  std::string image;                   // the PNG that those arguments make, beside the .pov
-  std::vector<std::string> written;    // every file, the .pov first
+  double depth_far = 0.0;  // depth mode: see above
+  std::vector<std::string>
+      arguments;                     // after "povray": renders IMAGE.png from the .pov's own folder
+  std::string image;                 // the PNG that those arguments make, beside the .pov
+  std::vector<std::string> written;  // every file, the .pov first
   // What POV-Ray cannot show as octrace does, one line each; empty: nothing known. Lines about the
   // look only (scene mode) and lines about coverage (depth mode) never mix: the mode decides.
   std::vector<std::string> notes;
 };
 
-// Writes PATH (*.pov), in depth mode the alpha maps that it needs, in scene mode the textures, as PNG
-// files named after it, and STEM.json beside it: {"version": 1, "mode": "depth" | "scene", "width",
-// "height", "far": number, "image": "STEM.png", "arguments": [...], "notes": [...]}. Each file is whole
-// or absent. Fails with exit 4 where a scene has more than 65535 objects (depth mode).
+// Writes PATH (*.pov), in depth mode the alpha maps that it needs, in scene mode the textures, as
+// PNG files named after it, and STEM.json beside it: {"version": 1, "mode": "depth" | "scene",
+// "width", "height", "far": number, "image": "STEM.png", "arguments": [...], "notes": [...]}. Each
+// file is whole or absent. Fails with exit 4 where a scene has more than 65535 objects (depth
+// mode).
 util::Result<PovrayFile> write_povray(const scene::Scene& scene, const scene::Camera& camera,
                                       const PovrayOptions& options, const std::string& path);
 
