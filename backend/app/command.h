@@ -16,5 +16,6 @@ using Run = std::function<util::Result<util::Exit>()>;
 // Each declares its options on the program's parser and sets `chosen` when its command is given.
 void declare_render(CLI::App& program, Run& chosen);
 void declare_info(CLI::App& program, Run& chosen);
+void declare_export(CLI::App& program, Run& chosen);
 
 }  // namespace octrace::app

@@ -58,6 +58,7 @@ int run(int argc, char** argv) {
   Run chosen;
   declare_render(program, chosen);
   declare_info(program, chosen);
+  declare_export(program, chosen);
   try {
     program.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
