@@ -27,6 +27,7 @@ struct VisitOrder {
 };
 inline constexpr VisitOrder kVisitOrder;
 
+// The same computation as node_frame() and ScalarChildTest, over axes first and then over children.
 struct SimdChildTest {
   // Not forced inline: the compiler refuses to force it into the portable traverse(), but inlines
   // it once traverse() itself has been inlined into a function of this target.
@@ -35,33 +36,68 @@ struct SimdChildTest {
     const hn::CappedTag<float, kChildren> d;
     const hn::RebindToSigned<decltype(d)> di;
     const hn::Rebind<std::uint8_t, decltype(d)> d8;
-    const NodeFrame frame = node_frame(node, ray);
+    alignas(16) float step[4], near[4], far[4];
+    frame(node, ray, step, near, far);
     std::uint32_t mask = 0;
     for (std::size_t first = 0; first < kChildren; first += hn::Lanes(d)) {
-      auto near = hn::Set(d, tmin);
-      auto far = hn::Set(d, tmax);
+      auto entry = hn::Set(d, tmin);
+      auto exit = hn::Set(d, tmax);
       for (int axis = 0; axis < 3; ++axis) {
-        const bool negative = (ray.octant >> axis) & 1;
-        const std::uint8_t* entry = (negative ? node.upper : node.lower)[axis] + first;
-        const std::uint8_t* exit = (negative ? node.lower : node.upper)[axis] + first;
-        const auto step = hn::Set(d, frame.step[axis]);
-        const auto q_entry = hn::ConvertTo(d, hn::PromoteTo(di, hn::LoadU(d8, entry)));
-        const auto q_exit = hn::ConvertTo(d, hn::PromoteTo(di, hn::LoadU(d8, exit)));
-        near = hn::Max(near, hn::MulAdd(q_entry, step, hn::Set(d, frame.near[axis])));
-        far = hn::Min(far, hn::MulAdd(q_exit, step, hn::Set(d, frame.far[axis])));
+        // lower and upper are neighbours, so that the sign of the direction is an offset.
+        const std::size_t flip = ((ray.octant >> axis) & 1) * sizeof(node.lower);
+        const std::uint8_t* lower = node.lower[axis] + first;
+        const auto q_entry = hn::ConvertTo(d, hn::PromoteTo(di, hn::LoadU(d8, lower + flip)));
+        const auto q_exit =
+            hn::ConvertTo(d, hn::PromoteTo(di, hn::LoadU(d8, lower + sizeof(node.lower) - flip)));
+        entry = hn::Max(entry, hn::MulAdd(q_entry, hn::Set(d, step[axis]), hn::Set(d, near[axis])));
+        exit = hn::Min(exit, hn::MulAdd(q_exit, hn::Set(d, step[axis]), hn::Set(d, far[axis])));
       }
-      std::uint8_t bits[8] = {};
-      hn::StoreMaskBits(d, hn::Le(near, far), bits);
+      std::uint8_t bits[8];
+      hn::StoreMaskBits(d, hn::Le(entry, exit), bits);
       mask |= static_cast<std::uint32_t>(bits[0]) << first;
     }
-    ChildHits hits = static_cast<ChildHits>(kVisitOrder.order[ray.octant][mask & node.inner_mask])
-                     << 24;
+    const std::uint32_t inner = kVisitOrder.order[ray.octant][mask & node.inner_mask];
+    ChildHits hits = inner << 24;
     for (std::uint32_t leaves = mask & ~node.inner_mask; leaves != 0; leaves &= leaves - 1) {
       const std::uint32_t meta = node.meta[lowest_bit(leaves)];
       hits |= (meta >> 5) << (meta & 31u);
     }
     return hits;
   }
+
+ private:
+#if HWY_TARGET == HWY_SCALAR
+  static HWY_ATTR inline void frame(const Node& node, const SlabRay& ray, float* step, float* near,
+                                    float* far) {
+    const NodeFrame f = node_frame(node, ray);
+    for (int axis = 0; axis < 3; ++axis) {
+      step[axis] = f.step[axis];
+      near[axis] = f.near[axis];
+      far[axis] = f.far[axis];
+    }
+  }
+#else
+  // The fourth lane holds the exponents' bytes read as a float, and is ignored.
+  static HWY_ATTR inline void frame(const Node& node, const SlabRay& ray, float* step, float* near,
+                                    float* far) {
+    const hn::FixedTag<float, 4> d;
+    const hn::RebindToSigned<decltype(d)> di;
+    const hn::Rebind<std::int8_t, decltype(d)> d8;
+    const auto biased = hn::Add(hn::PromoteTo(di, hn::LoadU(d8, node.exponent)), hn::Set(di, 127));
+    const auto scale = hn::BitCast(d, hn::ShiftLeft<23>(biased));
+    const auto inverse = hn::LoadU(d, &ray.inverse.x);
+    const auto l = hn::Sub(hn::Load(d, node.origin), hn::LoadU(d, &ray.origin.x));
+    const auto u = hn::Add(l, hn::Mul(hn::Set(d, 255.0f), scale));
+    const auto m = hn::Max(hn::Abs(l), hn::Abs(u));
+    const auto m_xy = hn::Max(m, hn::Reverse2(d, m));
+    const float largest = greater(hn::GetLane(m_xy), hn::ExtractLane(m, 2));
+    const auto padding = hn::Mul(hn::Set(d, largest * kChildPadding), hn::Abs(inverse));
+    const auto base = hn::Mul(l, inverse);
+    hn::Store(hn::Mul(scale, inverse), d, step);
+    hn::Store(hn::Sub(base, padding), d, near);
+    hn::Store(hn::Add(base, padding), d, far);
+  }
+#endif
 };
 
 HWY_ATTR TraceStatus closest(const SceneView& scene, const RenderParams& params, const Ray& ray,

@@ -24,6 +24,7 @@ struct Options {
   std::vector<std::string> sets = {"primary", "bounce", "ao"};
   unsigned threads = 1;
   int repeats = 5;
+  bool count = false;
 };
 
 const char* name_of(EmbreePeer::Interface interface) {
@@ -127,6 +128,12 @@ class SceneBench {
     std::string line = fmt::format("{:<24} {:<8} {:8.2f} [{:.2f}, {:.2f}] Mrays/s", name_,
                                    bench::name_of(rays.set), mrays(spread.median),
                                    mrays(spread.highest), mrays(spread.lowest));
+    if (options_.count) {
+      const Work work = count_work(scene_, octree_, rays.rays, rays.any_hit);
+      row["nodes_per_ray"] = work.nodes;
+      row["triangles_per_ray"] = work.triangles;
+      line += fmt::format(", {:.1f} nodes {:.1f} triangles a ray", work.nodes, work.triangles);
+    }
     double best = 0.0;
     for (std::size_t k = 0; k < interfaces.size(); ++k) {
       const double rate = mrays(spread_of(peers[k]).median);
@@ -203,6 +210,7 @@ void add_rays_command(CLI::App& app, int& exit_code) {
       ->capture_default_str();
   command->add_option("--peer", options->peer, "Trace the same rays with this library, turn about")
       ->check(CLI::IsMember({"embree"}));
+  command->add_flag("--count", options->count, "Count nodes and triangles tested a ray");
   command->add_option("--json", options->json, "Write the rows to this file");
   command->callback([options, &exit_code] { exit_code = run(*options); });
 }

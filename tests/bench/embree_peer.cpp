@@ -159,7 +159,8 @@ double EmbreePeer::trace(const std::vector<kernels::Ray>& rays, bool any_hit, In
     for (std::size_t i = 0; i < rays.size(); ++i) {
       const RTCRayHit& r = converted[i];
       const bool hit = any_hit ? r.ray.tfar < 0.0f : r.hit.geomID != RTC_INVALID_GEOMETRY_ID;
-      (*hits)[i] = {r.ray.tfar, 0.0f, 0.0f, hit ? r.hit.primID : kernels::kNone};
+      const std::uint32_t triangle = any_hit ? 0 : r.hit.primID;
+      (*hits)[i] = {r.ray.tfar, 0.0f, 0.0f, hit ? triangle : kernels::kNone};
     }
   }
   return seconds;

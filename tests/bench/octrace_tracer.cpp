@@ -10,6 +10,44 @@
 
 namespace octrace::bench {
 
+namespace {
+
+struct CountingChildTest {
+  std::uint64_t* nodes;
+  std::uint64_t* triangles;
+  kernels::ChildHits operator()(const kernels::Node& node, const kernels::SlabRay& ray, float tmin,
+                                float tmax) const {
+    const kernels::ChildHits hits = kernels::ScalarChildTest{}(node, ray, tmin, tmax);
+    ++*nodes;
+    *triangles += static_cast<std::uint64_t>(kernels::count_bits(hits & kernels::kTriangleBits));
+    return hits;
+  }
+};
+
+}  // namespace
+
+Work count_work(const scene::Scene& scene, const octree::Octree& octree,
+                const std::vector<kernels::Ray>& rays, bool any_hit) {
+  kernels::SceneView view = scene.view();
+  view.octree = octree.view();
+  kernels::RenderParams params;
+  params.cull = 0;
+  params.alpha = 0;
+  std::uint64_t nodes = 0, triangles = 0;
+  const CountingChildTest test{&nodes, &triangles};
+  for (const kernels::Ray& ray : rays) {
+    kernels::Hit hit;
+    float transmittance;
+    if (any_hit) {
+      kernels::shadow_transmittance(view, params, ray, test, &transmittance);
+    } else {
+      kernels::closest_hit(view, params, ray, test, &hit);
+    }
+  }
+  const double count = static_cast<double>(std::max<std::size_t>(rays.size(), 1));
+  return {static_cast<double>(nodes) / count, static_cast<double>(triangles) / count};
+}
+
 double trace_cpu(const scene::Scene& scene, const octree::Octree& octree,
                  const std::vector<kernels::Ray>& rays, bool any_hit, unsigned threads,
                  std::vector<kernels::Hit>* hits) {

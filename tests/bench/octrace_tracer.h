@@ -15,4 +15,11 @@ double trace_cpu(const scene::Scene& scene, const octree::Octree& octree,
                  const std::vector<kernels::Ray>& rays, bool any_hit, unsigned threads,
                  std::vector<kernels::Hit>* hits);
 
+// What a ray costs in nodes and triangles tested, on average.
+struct Work {
+  double nodes = 0.0, triangles = 0.0;
+};
+Work count_work(const scene::Scene& scene, const octree::Octree& octree,
+                const std::vector<kernels::Ray>& rays, bool any_hit);
+
 }  // namespace octrace::bench
