@@ -16,6 +16,8 @@ using Run = std::function<util::Result<util::Exit>()>;
 // Each declares its options on the program's parser and sets `chosen` when its command is given.
 void declare_render(CLI::App& program, Run& chosen);
 void declare_info(CLI::App& program, Run& chosen);
+void declare_compare(CLI::App& program, Run& chosen);
+void declare_validate(CLI::App& program, Run& chosen);
 void declare_export(CLI::App& program, Run& chosen);
 
 }  // namespace octrace::app

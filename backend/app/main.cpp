@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <csignal>
 #include <cstdio>
 #include <cstdlib>
 #include <new>
@@ -58,6 +59,8 @@ int run(int argc, char** argv) {
   Run chosen;
   declare_render(program, chosen);
   declare_info(program, chosen);
+  declare_compare(program, chosen);
+  declare_validate(program, chosen);
   declare_export(program, chosen);
   try {
     program.parse(argc, argv);
@@ -69,6 +72,8 @@ int run(int argc, char** argv) {
 }
 
 int run_guarded(int argc, char** argv) {
+  // A file that may not grow further is then an error of write(), and reported as such.
+  std::signal(SIGXFSZ, SIG_IGN);
   try {
     return run(argc, argv);
   } catch (const std::bad_alloc&) {

@@ -27,7 +27,7 @@ std::string figure(const std::string& caption, const std::string& png, const Pic
                    const std::string& overlay, const std::string& below) {
   if (png.empty()) return "";
   return fmt::format(
-      R"(<figure><figcaption>{}</figcaption><div class="frame"><img loading="lazy" decoding="async" )"
+      R"(<figure><figcaption>{}</figcaption><div class="frame"><img loading="lazy" )"
       R"(width="{}" height="{}" alt="{}" src="data:image/png;base64,{}">{}</div>{}</figure>)",
       caption, pictures.width, pictures.height, "picture", base64(png), overlay, below);
 }

@@ -101,14 +101,14 @@ std::string attention(const Report& report) {
     }
     rows += fmt::format(
         R"(<tr><td><span class="chip {0}">{0}</span></td><td><a href="#c{1}">{2}, {3}</a></td>)"
-        R"(<td>{4}</td><td class="cause">{5}</td></tr>)",
+        R"(<td class="keep">{4}</td><td class="cause">{5}</td></tr>)",
         status_name(c.status), i, escape_html(c.scene), escape_html(c.camera),
         escape_html(c.second), why);
   }
   if (rows.empty()) return "";
   return R"(<details class="box" open><summary>What does not agree, and why</summary>)"
-         R"(<table class="plain">)" +
-         rows + "</table></details>";
+         R"(<div class="long"><table class="plain">)" +
+         rows + "</table></div></details>";
 }
 
 std::string tolerance_table(const Report& report) {
