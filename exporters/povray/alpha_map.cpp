@@ -44,7 +44,7 @@ util::Result<void> append_alpha_function(std::string& out, Job& job, std::uint32
   fmt::format_to(
       to,
       "\n#declare AlphaMap{0} = function {{ pigment {{ image_map {{ png \"{1}\" gamma 1.0 "
-      "interpolate 0 }} }} }}\n",
+      "}} }} }}\n",
       index, file);
   fmt::format_to(to,
                  "#declare AlphaTexel{0} = function(i,j) {{ "

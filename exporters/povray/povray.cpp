@@ -6,6 +6,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <iterator>
+#include <limits>
 #include <nlohmann/json.hpp>
 
 #include "backend/util/atomic_file.h"
@@ -24,7 +25,10 @@ std::vector<std::string> arguments_of(const Job& job) {
                                      fmt::format("+W{}", options.width),
                                      fmt::format("+H{}", options.height),
                                      "-D",
-                                     "-GA",
+                                     "-GD",
+                                     "-GR",
+                                     "-GS",
+
                                      "+FN16",
                                      "Dither=off",
                                      "+WT2"};
@@ -53,18 +57,23 @@ void append_camera(std::string& out, const CameraFrame& frame) {
                  vector_text(frame.up * height));
 }
 
-// The farthest corner of the bounds along the camera's axis, and a little more: no point of the
-// scene lies beyond, and the steps of 2^-30 are as small as they can be.
-double farthest_depth(const Job& job) {
+struct DepthRange {
+  double nearest = 0.0, farthest = 0.0;
+};
+
+// Of the corners of the bounds, along the camera's axis.
+DepthRange depths_of(const Job& job) {
   const scene::Bounds& bounds = job.scene.bounds;
-  double farthest = 0.0;
+  DepthRange range{std::numeric_limits<double>::infinity(), 0.0};
   for (int corner = 0; corner < 8; ++corner) {
     const glm::dvec3 point(corner & 1 ? bounds.upper.x : bounds.lower.x,
                            corner & 2 ? bounds.upper.y : bounds.lower.y,
                            corner & 4 ? bounds.upper.z : bounds.lower.z);
-    farthest = std::max(farthest, job.frame.depth_of(job.fit(point)));
+    const double depth = job.frame.depth_of(job.fit(point));
+    range.nearest = std::min(range.nearest, depth);
+    range.farthest = std::max(range.farthest, depth);
   }
-  return farthest > 0.0 ? farthest * (1.0 + 1e-6) : 1.0;
+  return range;
 }
 
 Job make_job(const scene::Scene& scene, const scene::Camera& camera, const PovrayOptions& options,
@@ -79,9 +88,13 @@ Job make_job(const scene::Scene& scene, const scene::Camera& camera, const Povra
     job.frame.bottom *= job.fit.scale;
     job.frame.top *= job.fit.scale;
   }
-  job.znear = camera.znear * job.fit.scale;
+  const DepthRange depths = depths_of(job);
+  // Planes that clip nothing cost nothing.
+  if (camera.znear * job.fit.scale >= depths.nearest) job.znear = camera.znear * job.fit.scale;
   job.zfar = camera.zfar * job.fit.scale;
-  job.depth_far = farthest_depth(job);
+  if (job.zfar > depths.farthest) job.zfar = std::numeric_limits<double>::infinity();
+  // A little beyond the farthest point, and so the steps of 2^-30 are as small as they can be.
+  job.depth_far = depths.farthest > 0.0 ? depths.farthest * (1.0 + 1e-6) : 1.0;
   job.result.depth_far = job.depth_far / job.fit.scale;
   job.result.image = job.path.stem + ".png";
   job.result.arguments = arguments_of(job);

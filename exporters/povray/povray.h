@@ -6,6 +6,7 @@
 
 #include "backend/scene/scene.h"
 #include "backend/util/result.h"
+#include "kernels/render_params.h"
 
 namespace octrace::exporters {
 
@@ -20,8 +21,8 @@ struct PovrayOptions {
   bool cull = true;  // back faces of single-sided materials are not there
   bool alpha =
       true;  // alpha mode MASK cuts out; BLEND is solid in depth mode, as in octrace's AOVs
-  kernels::Vec3 sky{0.5f, 0.6f, 0.75f};  // scene mode: radiance of the background, linear
-  // The scene has lights of its own; without, scene mode adds one beside the camera.
+  // Scene mode: radiance of the sky, linear, as octrace renders by default.
+  kernels::Vec3 sky = kernels::RenderParams{}.sky;
   int antialias = 0;  // scene mode: +A with this many subdivisions; 0: one ray a pixel
 };
 

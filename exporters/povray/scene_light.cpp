@@ -53,6 +53,7 @@ void append_local(std::string& out, Job& job, const kernels::Light& light) {
 
 void append_lights(std::string& out, Job& job) {
   out += '\n';
+  job.note("light of the sky reaches into every corner");
   if (job.scene.lights.empty()) {
     // As octrace lights a scene that brings no light.
     append_directional(out, glm::normalize(glm::dvec3(-0.55, -0.8, -0.45)), {2.1, 1.95, 1.7});

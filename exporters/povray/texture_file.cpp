@@ -115,10 +115,10 @@ util::Result<ImageMap> write_image_map(Job& job, std::uint32_t material,
 
   // glTF's second coordinate grows downwards, POV-Ray's image upwards.
   ImageMap map;
-  map.pigment = fmt::format(
-      "image_map {{ png \"{}\" gamma srgb {} }} scale <{},{},1> translate <{},{},0>", file,
-      texture.filter == kernels::Filter::nearest ? "interpolate 0" : "interpolate 2", across.count,
-      -down.count, across.first, down.first + down.count);
+  map.pigment =
+      fmt::format("image_map {{ png \"{}\" gamma srgb {} }} scale <{},{},1> translate <{},{},0>",
+                  file, texture.filter == kernels::Filter::nearest ? "" : "interpolate 2",
+                  across.count, -down.count, across.first, down.first + down.count);
   return map;
 }
 
