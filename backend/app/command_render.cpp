@@ -1,8 +1,6 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <filesystem>
-#include <map>
 #include <memory>
 
 #include "backend/app/camera_choice.h"
@@ -79,55 +77,42 @@ void declare_view(CLI::App& command, RenderOptions& options) {
                   fmt::format("radiance of the sky, linear [{},{},{}]", options.params.sky.x,
                               options.params.sky.y, options.params.sky.z))
       ->type_name("R,G,B");
-  command
-      .add_option("--background", options.params.transparent_background,
-                  "what beauty shows where nothing is hit [sky]")
-      ->transform(CLI::CheckedTransformer(
-          std::map<std::string, std::uint32_t>{{"sky", 0}, {"transparent", 1}}))
-      ->type_name("sky|transparent");
-  command
-      .add_option("--cull", options.params.cull,
-                  "back faces: spec culls them as doubleSided says; none shows all [spec]")
-      ->transform(
-          CLI::CheckedTransformer(std::map<std::string, std::uint32_t>{{"none", 0}, {"spec", 1}}))
-      ->type_name("spec|none");
-  command
-      .add_option("--alpha", options.params.alpha,
-                  "spec follows alphaMode; ignore makes everything opaque [spec]")
-      ->transform(
-          CLI::CheckedTransformer(std::map<std::string, std::uint32_t>{{"ignore", 0}, {"spec", 1}}))
-      ->type_name("spec|ignore");
+  add_choice<std::uint32_t>(command, "--background", options.params.transparent_background,
+                            {{"sky", 0}, {"transparent", 1}},
+                            "what beauty shows where nothing is hit [sky]");
+  add_choice<std::uint32_t>(
+      command, "--cull", options.params.cull, {{"spec", 1}, {"none", 0}},
+      "back faces: spec culls them as doubleSided says; none shows all [spec]");
+  add_choice<std::uint32_t>(command, "--alpha", options.params.alpha, {{"spec", 1}, {"ignore", 0}},
+                            "spec follows alphaMode; ignore makes everything opaque [spec]");
   command
       .add_option("--depth-scale", options.depth_scale,
                   "units a metre of 16-bit depth; 1000: millimetres, up to 65.534 m [1000]")
-      ->check(CLI::PositiveNumber)
+      ->check(CLI::PositiveNumber.description(""))
       ->type_name("S");
 }
 
 void declare_running(CLI::App& command, RenderOptions& options) {
-  command.add_option("--device", options.device, "where to trace; auto takes the CPU [auto]")
-      ->transform(CLI::CheckedTransformer(std::map<std::string, Device>{
-          {"auto", Device::automatic}, {"cpu", Device::cpu}, {"cuda", Device::cuda}}))
-      ->type_name("auto|cpu|cuda");
+  add_choice<Device>(command, "--device", options.device,
+                     {{"auto", Device::automatic}, {"cpu", Device::cpu}, {"cuda", Device::cuda}},
+                     "where to trace; auto takes the CPU [auto]");
   command
       .add_option("--tile", options.tile,
                   "pixels a side of what a thread takes at once. Never changes the image [16]")
-      ->check(CLI::Range(1, 4096))
+      ->check(CLI::Range(1, 4096).description(""))
       ->type_name("N");
   command
       .add_option("--stats", options.stats,
                   "write times, rays, octree figures and memory to this JSON file")
       ->type_name("FILE.json");
-  command
-      .add_option("--progress", options.progress,
-                  "on standard error; auto: a bar on a terminal, nothing when piped; json: a line "
-                  "each [auto]")
-      ->transform(CLI::CheckedTransformer(
-          std::map<std::string, ProgressMode>{{"auto", ProgressMode::automatic},
-                                              {"bar", ProgressMode::bar},
-                                              {"json", ProgressMode::json},
-                                              {"none", ProgressMode::none}}))
-      ->type_name("auto|bar|json|none");
+  add_choice<ProgressMode>(
+      command, "--progress", options.progress,
+      {{"auto", ProgressMode::automatic},
+       {"bar", ProgressMode::bar},
+       {"json", ProgressMode::json},
+       {"none", ProgressMode::none}},
+      "on standard error; auto: a bar on a terminal, nothing when piped; json: "
+      "a line each [auto]");
 }
 
 util::Result<kernels::Vec3> parse_sky(const std::string& text) {

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <charconv>
-#include <map>
 
 #include "backend/util/log.h"
 
@@ -12,7 +11,8 @@ namespace octrace::app {
 namespace {
 
 constexpr const char* kTuning = "Octree";
-constexpr const char* kLimits = "Limits (exceeding one is exit code 6)";
+constexpr const char* kLimits =
+    "Limits (exceeding one is exit code 6; BYTES takes k, M, G as powers of 1024)";
 
 // Digits only, the whole text.
 std::optional<std::uint32_t> parse_count(std::string_view text) {
@@ -27,7 +27,8 @@ void add_limit(CLI::App& command, const std::string& name, std::uint64_t& value,
                const std::string& help, bool bytes) {
   CLI::Option* option =
       command.add_option(name, value, help)->group(kLimits)->capture_default_str();
-  if (bytes) option->transform(CLI::AsSizeValue(false));
+  option->type_name("N");
+  if (bytes) option->transform(CLI::AsSizeValue(false).description(""))->type_name("BYTES");
 }
 
 }  // namespace
@@ -42,32 +43,29 @@ void add_scene_options(CLI::App& command, SceneRequest& request) {
           "SCENE", request.source,
           "a .gltf or .glb file, or builtin:default, builtin:paper, builtin:terrain[:QUADS], "
           "builtin:soup[:TRIANGLES]")
-      ->required();
+      ->required()
+      ->type_name("");
   command.add_option("--scene", request.scene, "index of the glTF scene [the file's default]")
-      ->check(CLI::NonNegativeNumber);
-  command
-      .add_option("--missing-images", request.missing_images_warn,
-                  "a missing or broken texture: error, or warn and use the material's factor alone "
-                  "[error]")
-      ->transform(
-          CLI::CheckedTransformer(std::map<std::string, bool>{{"error", false}, {"warn", true}}))
-      ->type_name("error|warn");
+      ->check(CLI::NonNegativeNumber.description(""))
+      ->type_name("N");
+  add_choice<bool>(
+      command, "--missing-images", request.missing_images_warn, {{"error", false}, {"warn", true}},
+      "a missing or broken texture: error, or warn and use the material's factor alone "
+      "[error]");
   command
       .add_option("--threads", request.build.threads,
                   "threads to use; 0: all cores. Never changes the result [0]")
-      ->check(CLI::Range(0, 4096))
+      ->check(CLI::Range(0, 4096).description(""))
       ->type_name("N");
-  command
-      .add_option("--builder", request.build.builder,
-                  "sah: surface-area heuristic; median: the paper's. Never changes the image [sah]")
-      ->transform(CLI::CheckedTransformer(std::map<std::string, octree::Builder>{
-          {"median", octree::Builder::median}, {"sah", octree::Builder::sah}}))
-      ->type_name("median|sah")
+  add_choice<octree::Builder>(
+      command, "--builder", request.build.builder,
+      {{"median", octree::Builder::median}, {"sah", octree::Builder::sah}},
+      "sah: surface-area heuristic; median: the paper's. Never changes the image [sah]")
       ->group(kTuning);
   command
       .add_option("--leaf", request.build.leaf,
                   "most vertices (median) or triangles (sah) in a leaf [8, 3]")
-      ->check(CLI::Range(1, 1 << 20))
+      ->check(CLI::Range(1, 1 << 20).description(""))
       ->type_name("N")
       ->group(kTuning);
   command

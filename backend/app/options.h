@@ -4,6 +4,8 @@
 #include <CLI/CLI.hpp>
 #include <optional>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "backend/app/scene_session.h"
 #include "backend/util/limits.h"
@@ -14,6 +16,23 @@ namespace octrace::app {
 void add_scene_options(CLI::App& command, SceneRequest& request);
 void add_limit_options(CLI::App& command, util::Limits& limits);
 void add_verbosity_options(CLI::App& command);  // --quiet, --verbose
+
+// An option that takes one of a few words.
+template <class T>
+CLI::Option* add_choice(CLI::App& command, const std::string& name, T& value,
+                        std::vector<std::pair<std::string, T>> choices, const std::string& help) {
+  std::string words;
+  for (const auto& choice : choices) words += (words.empty() ? "" : "|") + choice.first;
+  const auto choose = [&value, choices = std::move(choices), name, words](const std::string& word) {
+    for (const auto& choice : choices) {
+      if (choice.first != word) continue;
+      value = choice.second;
+      return;
+    }
+    throw CLI::ValidationError(name, "takes " + words + ", not '" + word + "'");
+  };
+  return command.add_option_function<std::string>(name, choose, help)->type_name(words);
+}
 
 struct ImageSize {
   std::uint32_t width = 1280, height = 720;
