@@ -82,7 +82,7 @@ OCTRACE_HD TraceStatus trace_geometry(const SceneView& scene, const RayCamera& c
   Hit hit;
   const TraceStatus status = tracer.closest(scene, params, ray, &hit);
   if (status != TraceStatus::ok) return status;
-  const std::uint64_t pixel = static_cast<std::uint64_t>(y) * to.width + x;
+  const std::uint64_t pixel = to.pixel(x, y);
   if (hit.valid()) {
     store_hit(scene, ray, hit, to, pixel);
   } else {
@@ -109,7 +109,7 @@ OCTRACE_HD TraceStatus trace_beauty(const SceneView& scene, const RayCamera& cam
     if (status != TraceStatus::ok) return status;
     sum += color;
   }
-  store(to.floats(Aov::beauty), static_cast<std::uint64_t>(y) * to.width + x,
+  store(to.floats(Aov::beauty), to.pixel(x, y),
         sum / static_cast<float>(params.spp));
   return TraceStatus::ok;
 }

@@ -28,6 +28,7 @@ struct TraceStats {
   std::uint64_t beauty_rays = 0;  // camera, transparency and sky rays of beauty
   std::uint64_t shadow_rays = 0;
   double seconds = 0.0;
+  double upload_seconds = 0.0;  // of the scene to the device, once a scene; 0 on the CPU
   std::string device;  // "cpu: AMD EPYC 9654, 2 threads, AVX2"
 };
 

@@ -1,0 +1,44 @@
+// Traces views on an NVIDIA GPU, band by band, so that an image of any size fits.
+#pragma once
+
+#include <array>
+
+#include "backend/render/device_scene.h"
+#include "backend/render/renderer.h"
+
+namespace octrace::render {
+
+class CudaRenderer final : public Renderer {
+ public:
+  // Errors: exit 6 where the device's memory is too small (bytes wanted and free in the message),
+  // exit 7 for any other failure of CUDA.
+  static util::Result<std::unique_ptr<CudaRenderer>> create(const scene::Scene& scene,
+                                                            const octree::Octree& octree,
+                                                            int device);
+
+  util::Result<TraceStats> render(const kernels::RayCamera& camera, const Settings& settings,
+                                  Framebuffer& framebuffer) override;
+
+ private:
+  // Two bands are in flight: one is traced while the other is copied back.
+  struct Band {
+    DeviceStream stream;
+    DeviceMemory planes, report;
+    PinnedMemory host_planes, host_report;
+    std::uint32_t first_row = 0, rows = 0;  // rows 0: idle
+  };
+
+  CudaRenderer() = default;
+  kernels::cuda::Status prepare(std::uint64_t bytes_a_row, std::uint32_t rows);
+  util::Result<std::uint32_t> choose_rows(const Framebuffer& framebuffer);
+  kernels::cuda::Status start(Band& band, const kernels::cuda::View& view,
+                              const Framebuffer& framebuffer);
+  util::Result<void> finish(Band& band, Framebuffer& framebuffer, TraceStats& stats);
+
+  int device_ = 0;
+  std::string device_name_;
+  DeviceScene scene_;
+  std::array<Band, 2> bands_;
+};
+
+}  // namespace octrace::render

@@ -1,0 +1,79 @@
+// The one door from host code to CUDA: plain functions, no CUDA types. Every call reports a Status;
+// nothing throws, nothing prints.
+#pragma once
+
+#include <cstdint>
+
+#include "kernels/aov.h"
+#include "kernels/camera.h"
+#include "kernels/ray.h"
+#include "kernels/render_params.h"
+#include "kernels/scene_view.h"
+
+namespace octrace::kernels::cuda {
+
+struct Status {
+  int code = 0;           // cudaError_t
+  const char* name = "";  // "cudaErrorMemoryAllocation"
+  const char* text = "";  // "out of memory"
+  const char* call = "";  // what was being done
+  bool ok() const { return code == 0; }
+  bool out_of_memory() const { return code == 2; }
+};
+
+struct Device {
+  char name[256];
+  int major, minor;  // compute capability
+  int multiprocessors;
+  std::uint64_t total_bytes, free_bytes;
+};
+
+// The oldest compute capability that the kernels are compiled for.
+inline constexpr int kOldestMajor = 7, kOldestMinor = 5;
+
+Status count_devices(int* count);
+Status select_device(int index);  // for the calling thread; all calls below go to it
+Status query_device(int index, Device* device);
+
+// Plain device memory, never managed memory.
+Status allocate(void** memory, std::uint64_t bytes);
+void release(void* memory);
+Status allocate_pinned(void** memory, std::uint64_t bytes);
+void release_pinned(void* memory);
+
+using Stream = void*;
+Status create_stream(Stream* stream);
+void destroy_stream(Stream stream);
+Status synchronize(Stream stream);
+Status copy_to_device(void* to, const void* from, std::uint64_t bytes, Stream stream);
+Status copy_to_host(void* to, const void* from, std::uint64_t bytes, Stream stream);
+Status clear(void* memory, std::uint64_t bytes, Stream stream);
+
+// What a launch reports beside its pixels, in device memory, zeroed before the launch.
+struct Report {
+  unsigned long long beauty_rays, shadow_rays;
+  std::uint32_t status;  // TraceStatus of a pixel that failed; 0: none
+  std::uint32_t x, y;    // that pixel
+};
+
+// All pointers in scene, target and report are device memory. target.height rows are traced, from
+// target.first_row of the image on.
+struct View {
+  SceneView scene;
+  RayCamera camera;
+  RenderParams params;
+  FramebufferView target;
+  bool geometry, beauty;
+};
+Status launch_view(const View& view, Report* report, Stream stream);
+
+// Closest or any hit of a buffer of rays, geometry only: culling as params say, alpha ignored.
+// Any-hit queries set triangle to 0 where something was hit and to kNone elsewhere.
+Status launch_rays(const OctreeView& octree, const RenderParams& params, const Ray* rays, Hit* hits,
+                   std::uint64_t count, bool any_hit, Report* report, Stream stream);
+
+// Milliseconds that the device spent on the launch, for benchmarks; waits for its end.
+Status time_rays(const OctreeView& octree, const RenderParams& params, const Ray* rays, Hit* hits,
+                 std::uint64_t count, bool any_hit, Report* report, float* milliseconds);
+
+}  // namespace octrace::kernels::cuda
