@@ -10,6 +10,7 @@
 #include "backend/app/progress.h"
 #include "backend/app/render_stats.h"
 #include "backend/image/image.h"
+#include "backend/render/device.h"
 #include "backend/render/renderer.h"
 #include "backend/util/interrupt.h"
 #include "backend/util/log.h"
@@ -20,8 +21,6 @@ namespace octrace::app {
 
 namespace {
 
-enum class Device { automatic, cpu, cuda };
-
 struct RenderOptions {
   SceneRequest scene;
   std::vector<std::string> outputs;
@@ -30,7 +29,8 @@ struct RenderOptions {
   kernels::RenderParams params;
   std::uint32_t tile = 16;
   double depth_scale = 1000.0;
-  Device device = Device::automatic;
+  std::string device = "auto";
+  render::DeviceChoice device_choice;
   ProgressMode progress = ProgressMode::automatic;
 };
 
@@ -93,9 +93,10 @@ void declare_view(CLI::App& command, RenderOptions& options) {
 }
 
 void declare_running(CLI::App& command, RenderOptions& options) {
-  add_choice<Device>(command, "--device", options.device,
-                     {{"auto", Device::automatic}, {"cpu", Device::cpu}, {"cuda", Device::cuda}},
-                     "where to trace; auto takes the CPU [auto]");
+  command
+      .add_option("--device", options.device,
+                  "auto, cpu, cuda or cuda:N; auto takes the GPU where there is one [auto]")
+      ->type_name("DEVICE");
   command
       .add_option("--tile", options.tile,
                   "pixels a side of what a thread takes at once. Never changes the image [16]")
@@ -165,10 +166,9 @@ util::Result<Plan> make_plan(RenderOptions& options) {
     if (!sky) return sky.error();
     options.params.sky = *sky;
   }
-  if (options.device == Device::cuda) {
-    return util::Error{util::Exit::unsupported, "",
-                       "--device cuda: this octrace was built without CUDA", "", ""};
-  }
+  util::Result<render::DeviceChoice> device = render::parse_device(options.device);
+  if (!device) return device.error();
+  options.device_choice = *device;
   if (options.camera.ends_with(".json")) {
     util::Result<scene::Camera> camera = scene::read_camera_file(options.camera);
     if (!camera) return camera.error();
@@ -203,7 +203,7 @@ util::Result<render::TraceStats> trace(const RenderOptions& options, const Scene
                                        const scene::Camera& camera, Progress& progress,
                                        render::Framebuffer& framebuffer) {
   const std::unique_ptr<render::Renderer> renderer =
-      render::make_cpu_renderer(session.scene, session.octree);
+      render::make_renderer(session.scene, session.octree, options.device_choice);
   render::Settings settings;
   settings.params = options.params;
   settings.threads = options.scene.build.threads;
