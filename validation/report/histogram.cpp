@@ -8,7 +8,7 @@
 namespace octrace::validation {
 namespace {
 
-constexpr double kWidth = 520, kHeight = 170, kLeft = 8, kRight = 8, kTop = 26, kBottom = 30;
+constexpr double kWidth = 460, kHeight = 170, kLeft = 8, kRight = 8, kTop = 26, kBottom = 30;
 constexpr double kPlotWidth = kWidth - kLeft - kRight, kPlotHeight = kHeight - kTop - kBottom;
 
 double position(double error) {
