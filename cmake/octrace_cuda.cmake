@@ -6,7 +6,9 @@ if(NOT OCTRACE_CUDA STREQUAL "OFF")
     set(CMAKE_CUDA_COMPILER /usr/local/cuda/bin/nvcc)
   endif()
   # Code for the data centre's Ampere and Hopper; everything from Turing on compiles the PTX.
-  set(CMAKE_CUDA_ARCHITECTURES 75-virtual 80-real 90-real)
+  set(OCTRACE_CUDA_ARCHITECTURES 75-virtual 80-real 90-real CACHE STRING
+      "GPUs to compile for, as in CMAKE_CUDA_ARCHITECTURES; fewer build faster")
+  set(CMAKE_CUDA_ARCHITECTURES ${OCTRACE_CUDA_ARCHITECTURES})
   check_language(CUDA)
   if(CMAKE_CUDA_COMPILER)
     enable_language(CUDA)
