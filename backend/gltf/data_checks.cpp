@@ -33,7 +33,7 @@ void check_sparse_indices(const tinygltf::Model& model, std::size_t index, Issue
   if (!accessor.sparse.isSparse) return;
   std::vector<std::uint32_t> places;
   read_sparse_indices(model, static_cast<int>(index), places);
-  const std::string pointer = fmt::format("/accessors/{}", index);
+  const std::string pointer = fmt::format("/accessors/{}/sparse", index);
   for (std::size_t i = 0; i < places.size(); ++i) {
     if (places[i] >= accessor.count) {
       issues.invalid("ACCESSOR_SPARSE_INDEX_OOB", pointer,
@@ -101,12 +101,14 @@ void check_joints(const tinygltf::Model& model, LargestValues& largest, Issues& 
 void check_times(const tinygltf::Model& model, Issues& issues) {
   std::vector<bool> seen(model.accessors.size());
   std::vector<float> times;
-  for (const auto& animation : model.animations) {
-    for (const auto& sampler : animation.samplers) {
+  for (std::size_t a = 0; a < model.animations.size(); ++a) {
+    const auto& samplers = model.animations[a].samplers;
+    for (std::size_t s = 0; s < samplers.size(); ++s) {
+      const auto& sampler = samplers[s];
       const auto index = static_cast<std::size_t>(sampler.input);
       if (seen[index]) continue;
       seen[index] = true;
-      const std::string pointer = fmt::format("/accessors/{}", index);
+      const std::string pointer = fmt::format("/animations/{}/samplers/{}/input", a, s);
       // Without a buffer view nearly all times are zero, and only the first one may be.
       if (model.accessors[index].bufferView < 0 && model.accessors[index].count > 1 &&
           !model.accessors[index].sparse.isSparse) {
@@ -135,7 +137,8 @@ constexpr float kAffineTolerance = 1e-3f;
 
 void check_bind_matrices(const tinygltf::Model& model, Issues& issues) {
   std::vector<float> values;
-  for (const auto& skin : model.skins) {
+  for (std::size_t s = 0; s < model.skins.size(); ++s) {
+    const auto& skin = model.skins[s];
     if (skin.inverseBindMatrices < 0) continue;
     read_floats(model, skin.inverseBindMatrices, values);
     for (std::size_t i = 0; i + 16 <= values.size(); i += 16) {
@@ -144,7 +147,7 @@ void check_bind_matrices(const tinygltf::Model& model, Issues& issues) {
                           std::abs(values[i + 11]) <= kAffineTolerance &&
                           std::abs(values[i + 15] - 1.0f) <= kAffineTolerance;
       if (affine) continue;
-      issues.invalid("ACCESSOR_INVALID_IBM", fmt::format("/accessors/{}", skin.inverseBindMatrices),
+      issues.invalid("ACCESSOR_INVALID_IBM", fmt::format("/skins/{}/inverseBindMatrices", s),
                      fmt::format("the fourth row of matrix {} is not 0 0 0 1", i / 16));
       return;
     }

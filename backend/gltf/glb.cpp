@@ -61,10 +61,10 @@ GlbChunks parse_glb(std::span<const std::uint8_t> bytes, Issues& issues) {
   std::size_t offset = kHeaderBytes;
   while (offset < length) {
     if (bytes.size() == offset) break;
-    if (std::min(length, bytes.size()) - offset < kChunkHeaderBytes) {
+    if (bytes.size() - offset < kChunkHeaderBytes) {
       return fail("GLB_UNEXPECTED_END_OF_CHUNK_HEADER",
                   fmt::format("needs {} bytes at {}, has {}", kChunkHeaderBytes, offset,
-                              std::min(length, bytes.size()) - offset));
+                              bytes.size() - offset));
     }
     const std::size_t size = little_endian_32(bytes, offset);
     const std::uint32_t type = little_endian_32(bytes, offset + 4);
@@ -77,10 +77,11 @@ GlbChunks parse_glb(std::span<const std::uint8_t> bytes, Issues& issues) {
       return fail("GLB_CHUNK_LENGTH_UNALIGNED",
                   fmt::format("needs a multiple of 4, chunk 0x{:08x} has {} bytes", type, size));
     }
-    if (size > length - offset) {
+    const std::size_t left = length > offset ? length - offset : 0;
+    if (size > left) {
       return fail("GLB_CHUNK_TOO_BIG", fmt::format("chunk 0x{:08x} needs {} bytes, {} are left in "
                                                    "the declared length of {}",
-                                                   type, size, length - offset, length));
+                                                   type, size, left, length));
     }
     if (size > bytes.size() - offset) {
       return fail("GLB_UNEXPECTED_END_OF_CHUNK_DATA",

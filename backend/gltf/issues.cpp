@@ -27,10 +27,9 @@ std::vector<std::string> Issues::take_warnings() {
   return std::move(warnings_);
 }
 
-std::string quote(std::string_view text) {
-  constexpr std::size_t kLongest = 80;
+std::string quote(std::string_view text, std::size_t longest) {
   std::string out = "\"";
-  for (const char c : text.substr(0, kLongest)) {
+  for (const char c : text.substr(0, longest)) {
     const auto byte = static_cast<unsigned char>(c);
     if (byte < 0x20 || byte == 0x7f) {
       out += fmt::format("\\x{:02x}", byte);
@@ -38,8 +37,22 @@ std::string quote(std::string_view text) {
       out += c;
     }
   }
-  if (text.size() > kLongest) out += "...";
+  if (text.size() > longest) out += "...";
   return out + "\"";
+}
+
+std::string pointer_key(std::string_view key) {
+  std::string out;
+  for (const char c : key) {
+    if (c == '~') {
+      out += "~0";
+    } else if (c == '/') {
+      out += "~1";
+    } else {
+      out += c;
+    }
+  }
+  return out;
 }
 
 }  // namespace octrace::gltf

@@ -21,7 +21,7 @@ class Issues {
   void invalid(std::string_view code, std::string pointer, std::string message) {
     fail(util::Exit::invalid_input, code, std::move(pointer), std::move(message));
   }
-  // At most one warning a code and pointer; beyond kMaxWarnings only their number is kept.
+  // Beyond kMaxWarnings only their number is kept.
   void warn(std::string_view code, std::string pointer, std::string message);
 
   const std::string& file() const { return file_; }
@@ -37,6 +37,9 @@ class Issues {
 };
 
 // A text from the file as it may be printed: control characters escaped, long ones cut.
-std::string quote(std::string_view text);
+std::string quote(std::string_view text, std::size_t longest = 80);
+
+// A member's name as it stands in a JSON pointer (RFC 6901, section 3).
+std::string pointer_key(std::string_view key);
 
 }  // namespace octrace::gltf

@@ -8,21 +8,6 @@
 namespace octrace::gltf {
 namespace {
 
-// RFC 6901, section 3.
-std::string escaped(std::string_view key) {
-  std::string out;
-  for (const char c : key) {
-    if (c == '~') {
-      out += "~0";
-    } else if (c == '/') {
-      out += "~1";
-    } else {
-      out += c;
-    }
-  }
-  return out;
-}
-
 std::string shown(const Json& json) {
   if (json.is_string()) return quote(json.get_ref<const std::string&>());
   if (json.is_structured()) return fmt::format("{} of {}", json.type_name(), json.size());
@@ -33,11 +18,7 @@ std::string shown(const Json& json) {
 
 std::string JsonRef::pointer() const {
   if (!parent_) return "";
-  return parent_->pointer() + "/" + (key_.data() ? escaped(key_) : std::to_string(index_));
-}
-
-std::string JsonRef::pointer_of(std::string_view key) const {
-  return pointer() + "/" + escaped(key);
+  return parent_->pointer() + "/" + (key_.data() ? pointer_key(key_) : std::to_string(index_));
 }
 
 JsonRef JsonRef::member(std::string_view key) const& {
@@ -61,6 +42,11 @@ JsonRef JsonRef::element(std::size_t i) const& {
 }
 
 void JsonRef::mismatch(std::string_view wanted) const {
+  if (parent_ && !key_.data()) {
+    parent_->invalid("ARRAY_TYPE_MISMATCH", fmt::format("element {} needs to be {}, is {}", index_,
+                                                        wanted, shown(*json_)));
+    return;
+  }
   invalid("TYPE_MISMATCH", fmt::format("needs {}, has {}", wanted, shown(*json_)));
 }
 
@@ -137,16 +123,17 @@ int JsonRef::as_index(std::size_t size, std::string_view what) const {
     invalid("INVALID_INDEX", fmt::format("an index cannot be {}", shown(*json_)));
     return -1;
   }
-  // Whatever the range, a reference beyond the array is unresolved rather than out of range.
-  const auto value = as_integer(0, std::numeric_limits<std::int64_t>::max());
-  if (!value) return -1;
+  // However large, a reference beyond the array is unresolved rather than out of range.
   const auto end = std::min<std::size_t>(size, std::numeric_limits<int>::max());
-  if (static_cast<std::uint64_t>(*value) >= end) {
+  const auto value = as_number(0, std::numeric_limits<double>::max());
+  if (!value) return -1;
+  if (*value >= static_cast<double>(end)) {
     invalid("UNRESOLVED_REFERENCE",
-            fmt::format("needs {} {}, the file has {}", what, *value, size));
+            fmt::format("needs {} {}, the file has {}", what, shown(*json_), size));
     return -1;
   }
-  return static_cast<int>(*value);
+  const auto index = as_integer(0, std::numeric_limits<int>::max());
+  return index ? static_cast<int>(*index) : -1;
 }
 
 std::optional<double> JsonRef::as_number(double lowest, double highest) const {

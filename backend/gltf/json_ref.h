@@ -23,7 +23,6 @@ class JsonRef {
   Json& json() const { return *json_; }
   Issues& issues() const { return *issues_; }
   std::string pointer() const;
-  std::string pointer_of(std::string_view key) const;
 
   // A member of an object. Absent members are empty refs, which every reader passes over.
   JsonRef member(std::string_view key) const&;

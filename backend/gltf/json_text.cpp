@@ -61,6 +61,11 @@ Json parse_json(std::string_view text, const util::Limits& limits, Issues& issue
         fmt::format("the JSON is nested {} deep, --max-json-depth allows {}", depth, deepest));
     return Json::object();
   }
+  // The parser takes a zero byte for the end of its input, whatever stands behind it.
+  if (const auto zero = text.find('\0'); zero != std::string_view::npos) {
+    issues.invalid("INVALID_JSON", "", fmt::format("a zero byte at {}", zero));
+    return Json::object();
+  }
   try {
     Json root = Json::parse(text.begin(), text.end());
     if (root.is_object()) return root;
@@ -68,7 +73,7 @@ Json parse_json(std::string_view text, const util::Limits& limits, Issues& issue
                    fmt::format("needs an object at the top, has a{} {}", root.is_array() ? "n" : "",
                                root.type_name()));
   } catch (const Json::exception& e) {
-    issues.invalid("INVALID_JSON", "", quote(reason(e.what())));
+    issues.invalid("INVALID_JSON", "", quote(reason(e.what()), 240));
   }
   return Json::object();
 }

@@ -28,14 +28,13 @@ bool output_format_fits(const std::string& path, const tinygltf::Accessor& outpu
 
 void check_channel(const tinygltf::Model& model, const tinygltf::Animation& animation,
                    const tinygltf::AnimationChannel& channel, const std::string& pointer,
-                   Issues& issues) {
+                   Issues& issues) {  // pointer: the channel's
   if (channel.target_node < 0) return;
   const auto& sampler = animation.samplers[static_cast<std::size_t>(channel.sampler)];
   const auto& input = model.accessors[static_cast<std::size_t>(sampler.input)];
   const auto& output = model.accessors[static_cast<std::size_t>(sampler.output)];
-  const std::string place = fmt::format("{}/samplers/{}", pointer, channel.sampler);
   if (!output_format_fits(channel.target_path, output)) {
-    issues.invalid("ANIMATION_SAMPLER_OUTPUT_ACCESSOR_INVALID_FORMAT", place + "/output",
+    issues.invalid("ANIMATION_SAMPLER_OUTPUT_ACCESSOR_INVALID_FORMAT", pointer + "/sampler",
                    fmt::format("accessor {} is {}, which {} cannot be", sampler.output,
                                name_of(output), channel.target_path));
     return;
@@ -47,7 +46,7 @@ void check_channel(const tinygltf::Model& model, const tinygltf::Animation& anim
   }
   const auto needed = util::checked_mul(per_key, input.count);
   if (!needed || *needed != output.count) {
-    issues.invalid("ANIMATION_SAMPLER_OUTPUT_ACCESSOR_INVALID_COUNT", place + "/output",
+    issues.invalid("ANIMATION_SAMPLER_OUTPUT_ACCESSOR_INVALID_COUNT", pointer + "/sampler",
                    fmt::format("needs {} elements ({} for each of {} keys), accessor {} has {}",
                                needed.value_or(UINT64_MAX), per_key, input.count, sampler.output,
                                output.count));
@@ -109,7 +108,8 @@ void check_animation_links(const tinygltf::Model& model, Issues& issues) {
       }
     }
     for (std::size_t c = 0; c < animation.channels.size() && !issues.failed(); ++c) {
-      check_channel(model, animation, animation.channels[c], pointer, issues);
+      check_channel(model, animation, animation.channels[c],
+                    fmt::format("{}/channels/{}", pointer, c), issues);
     }
   }
 }

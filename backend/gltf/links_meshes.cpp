@@ -120,7 +120,7 @@ struct PrimitiveCheck {
     const auto& attributes = primitive.attributes;
     const std::size_t count = accessor(attributes.begin()->second).count;
     for (const auto& [name, index] : attributes) {
-      const std::string place = pointer + "/attributes/" + name;
+      const std::string place = pointer + "/attributes/" + pointer_key(name);
       check_format(place, name, index, false);
       if (accessor(index).count != count) {
         issues.invalid("MESH_PRIMITIVE_UNEQUAL_ACCESSOR_COUNT", place,
@@ -130,7 +130,7 @@ struct PrimitiveCheck {
     }
     for (std::size_t t = 0; t < primitive.targets.size() && !issues.failed(); ++t) {
       for (const auto& [name, index] : primitive.targets[t]) {
-        const std::string place = fmt::format("{}/targets/{}/{}", pointer, t, name);
+        const std::string place = fmt::format("{}/targets/{}/{}", pointer, t, pointer_key(name));
         check_format(place, name, index, true);
         if (accessor(index).count != count) {
           issues.invalid("MESH_PRIMITIVE_MORPH_TARGET_INVALID_ATTRIBUTE_COUNT", place,

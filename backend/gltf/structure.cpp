@@ -62,26 +62,36 @@ void check_asset(const JsonRef& root) {
   if (!asset) return;
   check_common(asset);
   for (const auto* key : {"generator", "copyright"}) (void)asset.member(key).as_string();
-  // Another major version is another format; a newer minor version may be read as the older one
-  // unless minVersion says no.
-  const auto check = [&](std::string_view key, bool is_minimum) {
-    const JsonRef ref = asset.member(key);
+  const auto read = [&](const JsonRef& ref) -> std::optional<Version> {
     const auto text = ref.as_string();
-    if (!text) return;
+    if (!text) return std::nullopt;
     const auto version = parse_version(*text);
     if (!version) {
       ref.invalid("PATTERN_MISMATCH", fmt::format("needs MAJOR.MINOR, has {}", quote(*text)));
-    } else if (version->major != 2 || (is_minimum && version->minor > 0)) {
-      root.issues().fail(util::Exit::unsupported, "UNKNOWN_ASSET_MAJOR_VERSION", ref.pointer(),
-                         fmt::format("octrace reads glTF 2.0, the file is {}", quote(*text)));
-    } else if (version->minor > 0) {
-      root.issues().warn("UNKNOWN_ASSET_MINOR_VERSION", ref.pointer(),
-                         fmt::format("{} is read as 2.0", quote(*text)));
     }
+    return version;
   };
-  (void)asset.required("version");
-  check("version", false);
-  check("minVersion", true);
+  const JsonRef version_ref = asset.required("version");
+  const JsonRef minimum_ref = asset.member("minVersion");
+  const auto version = read(version_ref);
+  const auto minimum = read(minimum_ref);
+  if (!version) return;
+  if (version->major != 2) {
+    root.issues().fail(
+        util::Exit::unsupported, "UNKNOWN_ASSET_MAJOR_VERSION", version_ref.pointer(),
+        fmt::format("octrace reads glTF 2.0, the file is {}.{}", version->major, version->minor));
+  } else if (minimum && (minimum->major != version->major || minimum->minor > version->minor)) {
+    minimum_ref.invalid("ASSET_MIN_VERSION_GREATER_THAN_VERSION",
+                        fmt::format("{}.{} is above the version {}.{}", minimum->major,
+                                    minimum->minor, version->major, version->minor));
+  } else if (minimum && minimum->minor > 0) {
+    root.issues().fail(util::Exit::unsupported, "UNKNOWN_ASSET_MINOR_VERSION",
+                       minimum_ref.pointer(),
+                       fmt::format("octrace reads glTF 2.0, the file needs 2.{}", minimum->minor));
+  } else if (version->minor > 0) {
+    root.issues().warn("UNKNOWN_ASSET_MINOR_VERSION", version_ref.pointer(),
+                       fmt::format("2.{} is read as 2.0", version->minor));
+  }
 }
 
 void check_extension_lists(const JsonRef& root) {

@@ -27,8 +27,8 @@ void check_target(const JsonRef& root, const JsonRef& channel, const Sizes& size
   if (!path || node < 0) return;
   const Json& object = root.json()["nodes"][static_cast<std::size_t>(node)];
   if (*path != "weights" && object.contains("matrix")) {
-    path_ref.invalid("ANIMATION_CHANNEL_TARGET_NODE_MATRIX",
-                     fmt::format("node {} has a matrix, which cannot be animated", node));
+    target.invalid("ANIMATION_CHANNEL_TARGET_NODE_MATRIX",
+                   fmt::format("node {} has a matrix, which cannot be animated", node));
   }
   if (*path == "weights") {
     bool morphs = false;
@@ -37,8 +37,8 @@ void check_target(const JsonRef& root, const JsonRef& channel, const Sizes& size
       morphs = root.json()["meshes"][mesh]["primitives"][0].contains("targets");
     }
     if (!morphs) {
-      path_ref.invalid("ANIMATION_CHANNEL_TARGET_NODE_WEIGHTS_NO_MORPHS",
-                       fmt::format("node {} has no morph targets", node));
+      target.invalid("ANIMATION_CHANNEL_TARGET_NODE_WEIGHTS_NO_MORPHS",
+                     fmt::format("node {} has no morph targets", node));
     }
   }
 }
@@ -75,8 +75,9 @@ void check_animations(const JsonRef& root, const Sizes& sizes) {
                           target.member("path").as_string().value_or("")};
       const auto [other, is_new] = targets.emplace(key, i);
       if (!is_new) {
-        target.invalid("ANIMATION_DUPLICATE_TARGETS",
-                       fmt::format("channel {} has the same target", other->second));
+        const JsonRef first = channels.element(other->second);
+        first.member("target").invalid("ANIMATION_DUPLICATE_TARGETS",
+                                       fmt::format("channel {} has the same target", i));
       }
     });
   });

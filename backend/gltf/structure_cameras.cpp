@@ -68,7 +68,8 @@ void check_light(const JsonRef& light) {
                            .as_number(kPositive, kHalfPi + kRounding)
                            .value_or(std::numbers::pi / 4);
   if (outer <= inner) {
-    spot.invalid(
+    const JsonRef outer_ref = spot.member("outerConeAngle");
+    outer_ref.invalid(
         "KHR_LIGHTS_PUNCTUAL_LIGHT_SPOT_ANGLES",
         fmt::format("needs outerConeAngle above innerConeAngle, has {} and {}", outer, inner));
   }

@@ -92,7 +92,7 @@ void check_images(const JsonRef& root, const Sizes& sizes) {
     if (uri && view) image.invalid("ONE_OF_MISMATCH", "has both uri and bufferView");
     if (!uri && !view) image.invalid("ONE_OF_MISMATCH", "needs uri or bufferView");
     if (view && !image.member("mimeType")) {
-      image.invalid("UNSATISFIED_DEPENDENCY", "needs mimeType beside bufferView");
+      view.invalid("UNSATISFIED_DEPENDENCY", "needs mimeType beside it");
     }
     if (index < 0 || root.issues().failed()) return;
     const JsonRef views = root.member("bufferViews");

@@ -10,7 +10,6 @@
 namespace octrace::gltf {
 namespace {
 
-constexpr std::array<std::int64_t, 7> kModes{0, 1, 2, 3, 4, 5, 6};
 constexpr std::array<std::string_view, 3> kPlainSemantics{"POSITION", "NORMAL", "TANGENT"};
 constexpr std::array<std::string_view, 4> kIndexedSemantics{"TEXCOORD", "COLOR", "JOINTS",
                                                             "WEIGHTS"};
@@ -79,7 +78,7 @@ void check_primitive(const JsonRef& primitive, const Sizes& sizes) {
   check_attributes(attributes, sizes);
   (void)primitive.member("indices").as_index(sizes.accessors, "accessor");
   (void)primitive.member("material").as_index(sizes.materials, "material");
-  (void)primitive.member("mode").as_one_of(kModes);
+  (void)primitive.member("mode").as_integer(0, 6);
   const JsonRef targets = primitive.member("targets");
   check_targets(targets, attributes, sizes);
 }

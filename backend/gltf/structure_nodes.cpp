@@ -41,7 +41,7 @@ void check_transform(const JsonRef& node) {
   if (matrix) {
     (void)matrix.as_numbers(16);
     if (node.member("translation") || node.member("rotation") || node.member("scale")) {
-      node.invalid("NODE_MATRIX_TRS", "has a matrix beside translation, rotation or scale");
+      matrix.invalid("NODE_MATRIX_TRS", "stands beside translation, rotation or scale");
     }
     if (node.issues().failed()) return;
     if (number_at(matrix, 3) != 0 || number_at(matrix, 7) != 0 || number_at(matrix, 11) != 0 ||
@@ -75,8 +75,9 @@ void check_node(const JsonRef& root, const JsonRef& node, const Sizes& sizes) {
   const JsonRef punctual = extensions.member("KHR_lights_punctual");
   if (punctual) (void)punctual.required("light").as_index(sizes.lights, "light");
   for (const auto* key : {"weights", "skin"}) {
-    if (node.member(key) && !node.member("mesh")) {
-      node.invalid("UNSATISFIED_DEPENDENCY", fmt::format("needs mesh beside {}", key));
+    const JsonRef dependent = node.member(key);
+    if (dependent && !node.member("mesh")) {
+      dependent.invalid("UNSATISFIED_DEPENDENCY", "needs mesh beside it");
     }
   }
   const JsonRef weights = node.member("weights").as_array();
