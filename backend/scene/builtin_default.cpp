@@ -1,6 +1,7 @@
 // builtin:default, a still life on a round stage that shows what the renderer does: metals and
 // dielectrics from smooth to rough, a procedural texture, foliage cut out by an alpha mask, a
 // blended pane, an emissive lamp, an unlit backdrop, flat facets, all three kinds of light.
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <glm/geometric.hpp>
@@ -94,15 +95,15 @@ void add_stage(SceneBuilder& scene) {
   const auto strip_material = scene.add_material("strip", metal({0.93f, 0.68f, 0.36f}, 0.28f));
 
   scene.add_object("stage");
-  const std::array<dvec2, 2> top = {dvec2(3.55, 0.0), dvec2(0.0, 0.0)};
+  const std::array<dvec2, 2> top = {dvec2(3.15, 0.0), dvec2(0.0, 0.0)};
   scene.add_mesh(make_lathe(top, 128), tile_material, dmat4(1.0));
   scene.add_object("rim");
-  const std::array<dvec2, 8> rim = {dvec2(0.0, -0.5),  dvec2(3.9, -0.5), dvec2(3.94, -0.46),
-                                    dvec2(3.94, -0.2), dvec2(3.7, -0.2), dvec2(3.7, -0.04),
-                                    dvec2(3.66, 0.0),  dvec2(3.6, 0.0)};
+  const std::array<dvec2, 8> rim = {dvec2(0.0, -0.36),  dvec2(3.44, -0.36), dvec2(3.48, -0.32),
+                                    dvec2(3.48, -0.17), dvec2(3.3, -0.17),  dvec2(3.3, -0.04),
+                                    dvec2(3.26, 0.0),   dvec2(3.2, 0.0)};
   scene.add_mesh(make_lathe(rim, 128), rim_material, dmat4(1.0));
-  const std::array<dvec2, 4> strip = {dvec2(3.605, 0.0), dvec2(3.595, 0.012), dvec2(3.555, 0.012),
-                                      dvec2(3.545, 0.0)};
+  const std::array<dvec2, 4> strip = {dvec2(3.205, 0.0), dvec2(3.195, 0.012), dvec2(3.155, 0.012),
+                                      dvec2(3.145, 0.0)};
   scene.add_mesh(make_lathe(strip, 128), strip_material, dmat4(1.0));
 }
 
@@ -126,9 +127,14 @@ void add_knot(SceneBuilder& scene) {
   knot.tube = 0.135;
   knot.along = 360;
   knot.around = 32;
-  scene.add_mesh(
-      make_torus_knot(knot), gold,
-      translated(foot + dvec3(0.0, 1.83, 0.0)) * turned(kUp, 0.04) * turned({0, 0, 1}, 0.25));
+  const Mesh mesh = make_torus_knot(knot);
+  const dmat4 upright = turned(kUp, 0.04) * turned({0, 0, 1}, 0.25);
+  double lowest = 0.0;
+  for (const dvec3& p : mesh.positions) {
+    lowest = std::min(lowest, (upright * glm::dvec4(p, 1.0)).y);
+  }
+  // It stands on the pedestal.
+  scene.add_mesh(mesh, gold, translated(foot + dvec3(0.0, 0.779 - lowest, 0.0)) * upright);
 }
 
 void add_spheres(SceneBuilder& scene) {
@@ -211,8 +217,8 @@ void add_pane(SceneBuilder& scene) {
 }
 
 void add_lamp(SceneBuilder& scene) {
-  Material glow = dielectric({1.0f, 0.9f, 0.7f}, 0.9f);
-  glow.emissive = Vec3(1.0f, 0.72f, 0.36f) * 2.6f;
+  Material glow = dielectric({0.25f, 0.2f, 0.12f}, 0.9f);
+  glow.emissive = Vec3(1.0f, 0.68f, 0.30f) * 1.25f;
   const auto globe = scene.add_material("glow", glow);
   const auto brass = scene.add_material("brass", metal({0.88f, 0.64f, 0.34f}, 0.35f));
   const dvec3 foot(-1.15, 0.0, 0.1);
@@ -236,7 +242,7 @@ void add_blocks_and_backdrop(SceneBuilder& scene) {
                  translated({1.22, 0.92, 0.4}) * turned(kUp, 0.2));
 
   Material sun;
-  sun.base_color = {0.93f, 0.30f, 0.16f, 1.0f};
+  sun.base_color = {0.90f, 0.24f, 0.13f, 1.0f};
   sun.unlit = 1;
   const auto unlit = scene.add_material("sun", sun);
   scene.add_object("backdrop");
@@ -288,7 +294,7 @@ Scene make_default_scene() {
   add_lamp(builder);
   add_blocks_and_backdrop(builder);
   add_lights(builder.scene());
-  Camera camera = look_at({1.1, 2.35, 7.6}, {0.0, 1.05, -0.3}, 0.56);
+  Camera camera = look_at({1.5, 3.3, 9.9}, {0.0, 0.93, -0.35}, 0.5);
   camera.name = "main";
   camera.znear = 0.1;
   builder.scene().cameras.push_back(camera);
