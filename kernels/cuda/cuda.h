@@ -9,6 +9,7 @@
 #include "kernels/ray.h"
 #include "kernels/render_params.h"
 #include "kernels/scene_view.h"
+#include "kernels/seed.h"
 
 namespace octrace::kernels::cuda {
 
@@ -49,6 +50,13 @@ Status copy_to_device(void* to, const void* from, std::uint64_t bytes, Stream st
 Status copy_to_host(void* to, const void* from, std::uint64_t bytes, Stream stream);
 Status clear(void* memory, std::uint64_t bytes, Stream stream);
 
+// Marks on a stream that the device takes the time at, for benchmarks.
+using Event = void*;
+Status create_event(Event* event);
+void destroy_event(Event event);
+Status record_event(Event event, Stream stream);
+Status elapsed(Event start, Event stop, float* milliseconds);  // waits for stop
+
 // What a launch reports beside its pixels, in device memory, zeroed before the launch.
 struct Report {
   unsigned long long beauty_rays, shadow_rays;
@@ -75,5 +83,16 @@ Status launch_rays(const OctreeView& octree, const RenderParams& params, const R
 // Milliseconds that the device spent on the launch, for benchmarks; waits for its end.
 Status time_rays(const OctreeView& octree, const RenderParams& params, const Ray* rays, Hit* hits,
                  std::uint64_t count, bool any_hit, Report* report, float* milliseconds);
+
+// The seed paper's experiment (kernels/seed.h); all pointers are device memory. hits: width *
+// height, rows from the top. rows_a_launch > 0.
+struct SeedImage {
+  SeedView scene;
+  RayCamera camera;
+  Hit* hits;
+  std::uint32_t width, height;
+};
+Status launch_seed(const SeedImage& image, std::uint32_t rows_a_launch, Report* report,
+                   Stream stream);
 
 }  // namespace octrace::kernels::cuda
