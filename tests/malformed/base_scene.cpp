@@ -2,14 +2,14 @@
 
 #include <cstring>
 
-namespace octrace::test {
+namespace octrace::tests {
 namespace {
 
 template <class T>
 void append(std::vector<std::uint8_t>& bytes, std::initializer_list<T> values) {
   for (const T value : values) {
-    const auto* begin = reinterpret_cast<const std::uint8_t*>(&value);
-    bytes.insert(bytes.end(), begin, begin + sizeof value);
+    const auto* raw = reinterpret_cast<const std::uint8_t*>(&value);
+    for (std::size_t i = 0; i < sizeof value; ++i) bytes.push_back(raw[i]);
   }
 }
 
@@ -152,4 +152,4 @@ std::vector<std::uint8_t> make_glb(const std::string& json, std::span<const std:
   return glb;
 }
 
-}  // namespace octrace::test
+}  // namespace octrace::tests

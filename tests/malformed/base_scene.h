@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-namespace octrace::test {
+namespace octrace::tests {
 
 std::string base64(std::span<const std::uint8_t> bytes);
 std::string data_uri(std::span<const std::uint8_t> bytes,
@@ -24,4 +24,4 @@ nlohmann::json base_scene();
 // A GLB of a JSON text and, unless empty, a BIN chunk.
 std::vector<std::uint8_t> make_glb(const std::string& json, std::span<const std::uint8_t> bin);
 
-}  // namespace octrace::test
+}  // namespace octrace::tests

@@ -12,7 +12,7 @@
 #include "backend/gltf/document.h"
 #include "tests/malformed/base_scene.h"
 
-namespace octrace::test {
+namespace octrace::tests {
 namespace {
 
 namespace fs = std::filesystem;
@@ -355,4 +355,4 @@ TEST(HostileGlb, Headers) {
 }
 
 }  // namespace
-}  // namespace octrace::test
+}  // namespace octrace::tests

@@ -10,7 +10,7 @@
 #include "tests/malformed/base_scene.h"
 #include "tests/malformed/patch_cases.h"
 
-namespace octrace::test {
+namespace octrace::tests {
 namespace {
 
 namespace fs = std::filesystem;
@@ -138,4 +138,4 @@ TEST(BaseScene, LoadsAsTextAndAsGlb) {
 }
 
 }  // namespace
-}  // namespace octrace::test
+}  // namespace octrace::tests

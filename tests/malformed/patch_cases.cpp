@@ -4,7 +4,7 @@
 
 #include "tests/malformed/base_scene.h"
 
-namespace octrace::test {
+namespace octrace::tests {
 namespace {
 
 std::string op(const std::string& kind, const std::string& path, const std::string& value) {
@@ -401,4 +401,4 @@ std::vector<PatchCase> patch_cases() {
   };
 }
 
-}  // namespace octrace::test
+}  // namespace octrace::tests

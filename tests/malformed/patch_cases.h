@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-namespace octrace::test {
+namespace octrace::tests {
 
 struct PatchCase {
   std::string name;
@@ -19,4 +19,4 @@ inline void PrintTo(const PatchCase& broken, std::ostream* stream) { *stream << 
 
 std::vector<PatchCase> patch_cases();
 
-}  // namespace octrace::test
+}  // namespace octrace::tests
