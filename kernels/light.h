@@ -15,12 +15,13 @@ struct Illumination {
   Vec3 irradiance;  // on a surface that faces the light; 0: out of range or of the cone
 };
 
-// A scene without lights is lit by a low afternoon sun from the right, above and in front.
+// A scene without lights is lit by a warm sun from the left, above and in front (+z): about 70
+// degrees off the view that frames a scene without a camera, which stands on the right.
 OCTRACE_HD inline Light default_light() {
   Light light{};
   light.type = LightType::directional;
-  light.direction = normalize_or(Vec3(-0.55f, -0.8f, -0.45f), Vec3(0.0f, -1.0f, 0.0f));
-  light.intensity = Vec3(2.1f, 1.95f, 1.7f);
+  light.direction = normalize_or(Vec3(0.55f, -0.75f, -0.45f), Vec3(0.0f, -1.0f, 0.0f));
+  light.intensity = Vec3(2.2f, 2.02f, 1.75f);
   light.range = std::numeric_limits<float>::infinity();
   return light;
 }

@@ -246,6 +246,34 @@ TEST(GeometryAovs, NormalsFaceTheViewerFromBothSides) {
   }
 }
 
+// The base colour's texture reads the second set, turned by a quarter; the uv plane stays the
+// first.
+TEST(GeometryAovs, SecondTextureCoordinatesAndTransform) {
+  scene::Scene scene = empty_scene();
+  kernels::Material material = matte(Vec3(1.0f));
+  material.base_color_texture.texture =
+      add_texture(scene, 2, 1, {0xff0000ffu, 0xff00ff00u}, kernels::Wrap::repeat,
+                  kernels::Filter::nearest, true);
+  material.base_color_texture.texcoord = 1;
+  material.base_color_texture.transform_u = {0, 1, 0};
+  material.base_color_texture.transform_v = {-1, 0, 0};
+  const auto geometry = add_mesh(scene, make_quad({0, 0, 0}, 1), add_material(scene, material));
+  scene.geometries[geometry].uv1 = static_cast<std::uint32_t>(scene.uvs.size());
+  for (const Vec2& uv : {Vec2(0, 2), Vec2(2, 2), Vec2(2, 0), Vec2(0, 0)}) scene.uvs.push_back(uv);
+  const Rendered image =
+      render_scene(scene, orthographic_at({0, 0, 2}, 1), 16, 16, {}, "albedo,uv");
+  for (int y = 0; y < 16; ++y) {
+    for (int x = 0; x < 16; ++x) {
+      // Downwards over the image v runs from 0 to 2, that is two repeats of red and green.
+      const bool red = y / 4 % 2 == 0;
+      ASSERT_EQ(image.vec3(Aov::albedo, x, y), red ? Vec3(1, 0, 0) : Vec3(0, 1, 0))
+          << x << " " << y;
+      const auto uv = &image.framebuffer.floats(Aov::uv)[2 * static_cast<std::size_t>(y * 16 + x)];
+      ASSERT_NEAR(uv[0], (x + 0.5) / 16, 1e-6);
+    }
+  }
+}
+
 TEST(GeometryAovs, DoNotDependOnSamples) {
   scene::Scene scene = tilted_plane();
   render::Settings one, many;
