@@ -78,11 +78,13 @@ kernels::RayCamera make_ray_camera(const Camera& camera, int width, int height) 
     x0 = -camera.cx / camera.fx;
     y0 = camera.cy / camera.fy;
   } else {
-    const double half =
-        camera.type == CameraType::perspective ? std::tan(0.5 * camera.yfov) : camera.ymag;
-    dx = 2.0 * half / h;
-    dy = -dx;
-    x0 = -half * w / h;
+    const bool perspective = camera.type == CameraType::perspective;
+    const double half = perspective ? std::tan(0.5 * camera.yfov) : camera.ymag;
+    // Of xmag only the sign counts, which mirrors the image as it does in a projection matrix.
+    const double half_x = perspective ? half : std::copysign(half, camera.xmag);
+    dx = 2.0 * half_x / h;
+    dy = -2.0 * half / h;
+    x0 = -half_x * w / h;
     y0 = half;
   }
 

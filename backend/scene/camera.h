@@ -20,9 +20,10 @@ enum class CameraType { perspective, orthographic, pinhole };
 struct Camera {
   std::string name;
   CameraType type = CameraType::perspective;
-  glm::dmat4 matrix{1.0};         // camera to world; scale is removed, as renderers do
-  double yfov = 0.8;              // perspective: radians
-  double xmag = 1.0, ymag = 1.0;  // orthographic: half of what the view spans; xmag is ignored
+  glm::dmat4 matrix{1.0};  // camera to world; scale is removed, as renderers do
+  double yfov = 0.8;       // perspective: radians
+  double xmag = 1.0,
+         ymag = 1.0;  // orthographic: half of what the view spans; of xmag only the sign counts
   // pinhole: pixels, from the image's top left corner (the first pixel's centre is 0.5, 0.5), for
   // an image of width x height pixels; 0: for whatever size is rendered
   double fx = 0, fy = 0, cx = 0, cy = 0;

@@ -69,11 +69,11 @@ TEST(SceneCamera, OrthographicRaysProjectBackAndIgnoreXmag) {
     const dmat4 rigid = random_rigid(random, 3.0);
     Camera camera;
     camera.type = CameraType::orthographic;
-    camera.xmag = 1000.0 * unit(random);
-    camera.ymag = 0.1 + 5 * unit(random);
+    camera.xmag = i % 3 == 0 ? -2.0 : 1000.0 * unit(random);
+    camera.ymag = (0.1 + 5 * unit(random)) * (i % 5 == 0 ? -1.0 : 1.0);
     camera.matrix = rigid;
     const int width = 640, height = 1 + random() % 1000;
-    const double xmag = camera.ymag * width / height;
+    const double xmag = std::abs(camera.ymag) * width / height * (i % 3 == 0 ? -1.0 : 1.0);
     const dmat4 projection = glm::ortho(-xmag, xmag, -camera.ymag, camera.ymag, 0.0, 100.0);
     const auto rays = make_ray_camera(camera, width, height);
     for (int k = 0; k < 20; ++k) {
@@ -81,8 +81,8 @@ TEST(SceneCamera, OrthographicRaysProjectBackAndIgnoreXmag) {
       const dvec3 point = at(camera_ray(rays, float(x), float(y)), t);
       EXPECT_NEAR(-(glm::inverse(rigid) * dvec4(point, 1.0)).z, t, 2e-5);
       const auto pixel = project(projection, rigid, point, width, height);
-      EXPECT_NEAR(pixel.x, x, 2e-5 * height / camera.ymag + 2e-3);
-      EXPECT_NEAR(pixel.y, y, 2e-5 * height / camera.ymag + 2e-3);
+      EXPECT_NEAR(pixel.x, x, 2e-5 * height / std::abs(camera.ymag) + 2e-3);
+      EXPECT_NEAR(pixel.y, y, 2e-5 * height / std::abs(camera.ymag) + 2e-3);
     }
   }
 }
