@@ -54,7 +54,7 @@ int run(int argc, char** argv) {
       "octree.");
   program.name("octrace");
   program.set_version_flag("--version", fmt::format("octrace {}", util::version()));
-  program.require_subcommand(1);
+  program.require_subcommand(0, 1);  // none is reported below, after words that are no command
   program.footer(kExamples);
   Run chosen;
   declare_render(program, chosen);
@@ -67,6 +67,7 @@ int run(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     return parse_failed(program, error);
   }
+  if (!chosen) return parse_failed(program, CLI::RequiredError("a command"));
   const util::Result<Exit> outcome = chosen();
   return outcome ? static_cast<int>(*outcome) : fail(outcome.error());
 }

@@ -67,6 +67,22 @@ util::Result<Rgba8> decode_with_library(std::span<const std::uint8_t> bytes,
   return image;
 }
 
+// Colours and alpha separately, so that the colours are those of the file.
+util::Result<Rgba8> decode_webp(std::span<const std::uint8_t> bytes, const EncodedHeader& header) {
+  if (webp_is_animated(bytes)) {
+    return util::Error{util::Exit::unsupported, "", "an animated WebP is no texture", "", ""};
+  }
+  util::Result<Rgba8> image = decode_with_library(bytes, header);
+  const std::optional<std::vector<std::uint8_t>> opaque = webp_without_alpha(bytes);
+  if (!image || !opaque) return image;
+  const util::Result<Rgba8> colors = decode_with_library(*opaque, header);
+  if (!colors) return colors;
+  for (std::size_t i = 0; i < image->texels.size(); ++i) {
+    image->texels[i] = (image->texels[i] & 0xff000000u) | (colors->texels[i] & 0x00ffffffu);
+  }
+  return image;
+}
+
 }  // namespace
 
 util::Result<Rgba8> decode_memory(std::span<const std::uint8_t> bytes, const std::string& mime,
@@ -83,10 +99,11 @@ util::Result<Rgba8> decode_memory(std::span<const std::uint8_t> bytes, const std
   }
   if (!header->complete) {
     return util::Error{util::Exit::invalid_input, "IMAGE_UNEXPECTED_EOS",
-                       "the JPEG ends before its end marker", "", ""};
+                       fmt::format("the {} ends early", mime), "", ""};
   }
   try {
-    return decode_with_library(bytes, *header);
+    return header->format == EncodedFormat::webp ? decode_webp(bytes, *header)
+                                                 : decode_with_library(bytes, *header);
   } catch (const std::bad_alloc&) {
     throw;
   } catch (const std::exception& exception) {  // from a decoder, about its input

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <vector>
 
 namespace octrace::image {
 
@@ -13,10 +14,15 @@ enum class EncodedFormat { png, jpeg, webp };
 struct EncodedHeader {
   EncodedFormat format = EncodedFormat::png;
   std::uint32_t width = 0, height = 0;
-  bool complete = true;  // JPEG: the end marker is there; others are checked by their decoders
+  bool complete = true;  // the end is there (WebP: its decoder checks that)
 };
 
 // Nothing where the bytes are none of the three formats, or end within the header.
 std::optional<EncodedHeader> read_encoded_header(std::span<const std::uint8_t> bytes);
+
+// The colours of a WebP that has alpha, as a WebP without; nothing where it has none. OpenImageIO
+// 2.4.7 gives a WebP's colours multiplied by alpha and no way back to them.
+std::optional<std::vector<std::uint8_t>> webp_without_alpha(std::span<const std::uint8_t> bytes);
+bool webp_is_animated(std::span<const std::uint8_t> bytes);
 
 }  // namespace octrace::image

@@ -134,7 +134,7 @@ util::Result<void> write_integer_file(const std::string& path, const ImageView& 
     spec.attribute(name, value);
     description += fmt::format("{}{}={}", description.empty() ? "" : "; ", name, value);
   }
-  if (tiff || jpeg) spec.attribute("ImageDescription", description);
+  if ((tiff || jpeg) && !description.empty()) spec.attribute("ImageDescription", description);
 
   const std::size_t pixel_bytes = spec.pixel_bytes();
   return write_file(path, spec, [&](std::uint32_t begin, std::uint32_t end, unsigned char* out) {

@@ -1,0 +1,53 @@
+#include <gtest/gtest.h>
+
+#include "tests/cli/driver.h"
+
+namespace octrace::test {
+namespace {
+
+// EXR files hold no date and no machine, so equal pixels are equal files.
+TEST(Identity, ThreadsTilesAndBuildersChangeNoBit) {
+  Scratch scratch;
+  const auto render = [&](const std::vector<std::string>& more) {
+    std::vector<std::string> arguments = {
+        "render", "builtin:default",     "--size", "72x50", "--spp", "4", "--aov", "all",
+        "-o",     scratch.path("a.exr"), "--quiet"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    const Outcome outcome = run(arguments);
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+    return read_text(scratch.path("a.exr"));
+  };
+  const std::string reference = render({"--threads", "1"});
+  ASSERT_GT(reference.size(), 10000u);
+  EXPECT_EQ(reference, render({"--threads", "2"}));
+  EXPECT_EQ(reference, render({"--threads", "5"}));
+  EXPECT_EQ(reference, render({"--tile", "8"}));
+  EXPECT_EQ(reference, render({"--tile", "64"}));
+  EXPECT_EQ(reference, render({"--tile", "1000", "--threads", "2"}));
+  EXPECT_EQ(reference, render({"--builder", "median"}));
+  EXPECT_EQ(reference, render({"--builder", "sah"}));
+  EXPECT_EQ(reference, render({"--builder", "median", "--leaf", "32"}));
+  EXPECT_EQ(reference, render({"--builder", "sah", "--leaf", "1"}));
+  EXPECT_EQ(reference, render({"--verify"}));
+  // The comparison can fail:
+  EXPECT_NE(reference, render({"--seed", "1"}));
+  EXPECT_NE(reference, render({"--spp", "5"}));
+  EXPECT_NE(reference, render({"--cull", "none"}));
+  EXPECT_NE(reference, render({"--alpha", "ignore"}));
+}
+
+TEST(Identity, IntegerFormatsToo) {
+  Scratch scratch;
+  const auto render = [&](const std::string& file, const std::string& threads) {
+    const Outcome outcome = run({"render", "builtin:default", "--size", "40x30", "--spp", "2",
+                                 "--quiet", "--threads", threads, "-o", scratch.path(file)});
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+    return read_text(scratch.path(file));
+  };
+  for (const char* file : {"a.png", "a.tif", "a.jpg"}) {
+    EXPECT_EQ(render(file, "1"), render(file, "2")) << file;
+  }
+}
+
+}  // namespace
+}  // namespace octrace::test

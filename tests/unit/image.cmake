@@ -1,0 +1,8 @@
+octrace_test(image_test
+  SOURCES image_decode.cpp image_exr.cpp image_integer.cpp image_png_builder.cpp
+  LIBRARIES GTest::gmock octrace_image octrace_util fmt::fmt
+  LABELS unit)
+# Reads the module's own header parser, which the thin library does not hold.
+octrace_test(image_header_test
+  SOURCES image_header.cpp image_png_builder.cpp ${CMAKE_SOURCE_DIR}/backend/image/encoded_header.cpp
+  LABELS unit)

@@ -1,0 +1,79 @@
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "backend/util/atomic_file.h"
+
+namespace octrace::test {
+namespace {
+
+namespace fs = std::filesystem;
+
+class AtomicFileTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = fs::temp_directory_path() /
+              ("octrace_atomic_" + std::to_string(::getpid()) + "_" +
+               ::testing::UnitTest::GetInstance()->current_test_info()->name());
+    fs::create_directories(folder_);
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+  std::string path(const char* name) const { return (folder_ / name).string(); }
+  std::size_t count() const {
+    return static_cast<std::size_t>(std::distance(fs::directory_iterator(folder_), {}));
+  }
+  static std::string text(const std::string& file) {
+    std::ifstream in(file);
+    return {std::istreambuf_iterator<char>(in), {}};
+  }
+  fs::path folder_;
+};
+
+TEST_F(AtomicFileTest, AppearsWhenCommitted) {
+  util::Result<util::AtomicFile> file = util::AtomicFile::create(path("a.exr"));
+  ASSERT_TRUE(file);
+  EXPECT_EQ(fs::path(file->temporary()).extension(), ".exr");
+  EXPECT_EQ(fs::path(file->temporary()).filename().string()[0], '.');
+  std::ofstream(file->temporary()) << "content";
+  EXPECT_FALSE(fs::exists(path("a.exr")));
+  ASSERT_TRUE(file->commit());
+  EXPECT_EQ(text(path("a.exr")), "content");
+  EXPECT_EQ(count(), 1u);
+}
+
+TEST_F(AtomicFileTest, VanishesOtherwise) {
+  {
+    util::Result<util::AtomicFile> file = util::AtomicFile::create(path("a.exr"));
+    ASSERT_TRUE(file);
+    EXPECT_EQ(count(), 1u);
+  }
+  EXPECT_EQ(count(), 0u);
+}
+
+TEST_F(AtomicFileTest, ReplacesAndRespectsTheUmask) {
+  ASSERT_TRUE(util::write_file(path("a.json"), "old"));
+  const mode_t mask = ::umask(022);
+  ASSERT_TRUE(util::write_file(path("a.json"), "new"));
+  ::umask(mask);
+  EXPECT_EQ(text(path("a.json")), "new");
+  struct stat status {};
+  ASSERT_EQ(::stat(path("a.json").c_str(), &status), 0);
+  EXPECT_EQ(status.st_mode & 0777u, 0644u);
+  EXPECT_EQ(count(), 1u);
+}
+
+TEST_F(AtomicFileTest, FoldersAndMissingFoldersAreErrors) {
+  for (const std::string& target :
+       {folder_.string(), folder_.string() + "/", path("missing/a.exr"), std::string()}) {
+    const util::Result<util::AtomicFile> file = util::AtomicFile::create(target);
+    ASSERT_FALSE(file) << target;
+    EXPECT_EQ(file.error().exit, util::Exit::io);
+  }
+  EXPECT_EQ(count(), 0u);
+}
+
+}  // namespace
+}  // namespace octrace::test
