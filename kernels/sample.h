@@ -73,7 +73,7 @@ struct Sampler {
 
   OCTRACE_HD Vec2 get2(std::uint32_t dimension) const {
     const std::uint32_t pattern = hash(pixel, dimension);
-    const auto columns = max_columns();
+    const auto columns = columns_of_strata();
     const std::uint32_t rows = (count + columns - 1) / columns;
     const std::uint32_t s = permute(sample, count, pattern * 0x51633e2du);
     const std::uint32_t sx = permute(s % columns, columns, pattern * 0x68bc21ebu);
@@ -88,7 +88,7 @@ struct Sampler {
   }
 
  private:
-  OCTRACE_HD std::uint32_t max_columns() const {
+  OCTRACE_HD std::uint32_t columns_of_strata() const {
     const auto root = static_cast<std::uint32_t>(square_root(static_cast<float>(count)));
     return root > 0 ? root : 1;
   }

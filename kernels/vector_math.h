@@ -25,7 +25,6 @@ OCTRACE_HD inline float largest(Vec3 a) { return greater(greater(a.x, a.y), a.z)
 OCTRACE_HD inline float largest_magnitude(Vec3 a) {
   return greater(greater(abs_of(a.x), abs_of(a.y)), abs_of(a.z));
 }
-OCTRACE_HD inline float mean(Vec3 a) { return (a.x + a.y + a.z) * (1.0f / 3.0f); }
 
 OCTRACE_HD inline bool is_finite(float x) { return x - x == 0.0f; }
 OCTRACE_HD inline bool is_finite(Vec3 a) {

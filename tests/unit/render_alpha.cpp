@@ -48,6 +48,18 @@ TEST(Alpha, BlendIsCompositedFrontToBack) {
   EXPECT_EQ(image.stats.shadow_rays, 0u);
 }
 
+// Through the squares' diagonals, where a ray meets both triangles of each.
+TEST(Alpha, BlendCountsAnEdgeOnce) {
+  scene::Scene scene = empty_scene();
+  add_wall(scene, 0, unlit({0, 0, 1, 1}, AlphaMode::opaque));
+  add_wall(scene, 1.3f, unlit({1, 0, 0, 0.25f}, AlphaMode::blend));
+  render::Settings settings;
+  settings.params.spp = 1;
+  const Rendered image = look(scene, settings);
+  for (int x = 0; x < kSize; ++x)
+    EXPECT_TRUE(near(image.rgba(x, kSize - 1 - x), {0.25f, 0, 0.75f, 1})) << x;
+}
+
 TEST(Alpha, IgnoredWhereAsked) {
   scene::Scene scene = empty_scene();
   add_wall(scene, 2, unlit({1, 0, 0, 0.25f}, AlphaMode::blend));
