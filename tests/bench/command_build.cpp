@@ -103,7 +103,9 @@ void add_build_command(CLI::App& app, int& exit_code) {
   command->add_option("--repeats", options->repeats, "Timed runs a row")
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
-  command->add_flag("--peer", options->peer, "Build with Embree as well, turn about");
+  if (EmbreePeer::available()) {
+    command->add_flag("--peer", options->peer, "Build with Embree as well, turn about");
+  }
   command->add_option("--json", options->json, "Write the rows to this file");
   command->callback([options, &exit_code] { exit_code = run(*options); });
 }

@@ -1,4 +1,5 @@
-// octrace-bench rays: Mrays/s of the three ray sets, beside Embree in the same process, turn about.
+// octrace-bench rays: Mrays/s of the three ray sets: on the CPU beside Embree in the same process,
+// turn about; or on a GPU, whose hits are compared with the CPU's bit for bit.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -6,11 +7,13 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
-#include "backend/util/atomic_file.h"
+#include "backend/render/device.h"
 #include "tests/bench/bench_scene.h"
 #include "tests/bench/commands.h"
 #include "tests/bench/embree_peer.h"
+#include "tests/bench/hits.h"
 #include "tests/bench/octrace_tracer.h"
+#include "tests/bench/ray_gpu.h"
 #include "tests/bench/ray_sets.h"
 #include "tests/bench/statistics.h"
 
@@ -18,9 +21,11 @@ namespace octrace::bench {
 
 namespace {
 
+constexpr int kLeastLaunches = 10;  // on a GPU
+
 struct Options {
   std::vector<std::string> scenes;
-  std::string camera, size = "1280x720", peer, json, builder = "sah";
+  std::string camera, size = "1280x720", peer, json, builder = "sah", device = "cpu";
   std::vector<std::string> sets = {"primary", "bounce", "ao"};
   unsigned threads = 1;
   int repeats = 5;
@@ -39,19 +44,6 @@ const char* name_of(EmbreePeer::Interface interface) {
   return "";
 }
 
-// The share of rays whose hits agree: the same triangle, or the same t within 1e-5.
-double agreement(const std::vector<kernels::Hit>& a, const std::vector<kernels::Hit>& b,
-                 bool any_hit) {
-  std::size_t agreeing = 0;
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    const bool same_kind = a[i].valid() == b[i].valid();
-    const bool same = any_hit || !a[i].valid() || a[i].triangle == b[i].triangle ||
-                      std::abs(a[i].t - b[i].t) <= 1e-5f * std::abs(b[i].t);
-    agreeing += same_kind && same;
-  }
-  return a.empty() ? 1.0 : static_cast<double>(agreeing) / static_cast<double>(a.size());
-}
-
 class SceneBench {
  public:
   SceneBench(const Options& options, std::string name, scene::Scene scene, octree::Octree octree)
@@ -64,6 +56,13 @@ class SceneBench {
     }
   }
 
+  util::Result<void> use_gpu(int device) {
+    util::Result<std::unique_ptr<RayGpu>> gpu = make_ray_gpu(octree_, device);
+    if (!gpu) return gpu.error();
+    gpu_ = std::move(*gpu);
+    return {};
+  }
+
   bool run(const kernels::RayCamera& camera, int width, int height, nlohmann::json& rows) {
     const std::vector<kernels::Ray> primary = primary_rays(camera, width, height);
     std::vector<kernels::Hit> hits;
@@ -74,7 +73,13 @@ class SceneBench {
         continue;
       const Rays rays = set == RaySet::primary ? Rays{set, false, primary}
                                                : secondary_rays(set, scene_, primary, hits);
-      if (!run_set(rays, rows)) return false;
+      if (gpu_ != nullptr) {
+        const util::Result<bool> same = run_set_on_gpu(rays, rows);
+        if (!same) fail(same.error());
+        if (!same || !*same) return false;
+      } else if (!run_set(rays, rows)) {
+        return false;
+      }
     }
     return true;
   }
@@ -90,7 +95,7 @@ class SceneBench {
       std::vector<kernels::Hit> theirs;
       peer_->trace(rays.rays, rays.any_hit, interfaces[0], options_.threads, &theirs);
       const double agreeing = agreement(ours, theirs, rays.any_hit);
-      if (agreeing < 0.9999) {
+      if (agreeing < kLeastAgreement) {
         fmt::print(stderr,
                    "octrace-bench: {} {}: hits agree with Embree's on only {:.4f} % of the rays\n",
                    name_, bench::name_of(rays.set), 100.0 * agreeing);
@@ -107,6 +112,48 @@ class SceneBench {
       }
     }
     report(rays, own, interfaces, peers, rows);
+    return true;
+  }
+
+  // False where a hit differs from the CPU's.
+  util::Result<bool> run_set_on_gpu(const Rays& rays, nlohmann::json& rows) {
+    std::vector<kernels::Hit> expected;
+    trace_cpu(scene_, octree_, rays.rays, rays.any_hit, options_.threads, &expected);
+    if (util::Result<void> loaded = gpu_->load(rays.rays); !loaded) return loaded.error();
+    const util::Result<std::vector<kernels::Hit>> found = gpu_->trace(rays.any_hit);
+    if (!found) return found.error();
+    const std::uint64_t differing = differing_hits(expected, *found, rays.any_hit);
+    if (differing != 0) {
+      fmt::print(stderr, "octrace-bench: {} {}: {} of {} hits differ between CPU and GPU\n", name_,
+                 bench::name_of(rays.set), differing, rays.rays.size());
+      return false;
+    }
+    std::vector<double> seconds;
+    for (int i = 0; i < std::max(options_.repeats, kLeastLaunches); ++i) {
+      const util::Result<double> time = gpu_->time(rays.any_hit);
+      if (!time) return time.error();
+      seconds.push_back(*time);
+    }
+    const Spread spread = spread_of(seconds);
+    const auto mrays = [&](double s) {
+      return s > 0.0 ? static_cast<double>(rays.rays.size()) / s * 1e-6 : 0.0;
+    };
+    fmt::print(
+        "{:<24} {:<8} {:9.1f} best, {:.1f} median, {:.1f} worst Mrays/s, {} rays, {}, 0 hits "
+        "differ from the CPU's\n",
+        name_, bench::name_of(rays.set), mrays(spread.lowest), mrays(spread.median),
+        mrays(spread.highest), rays.rays.size(), gpu_->name());
+    std::fflush(stdout);
+    rows.push_back({{"scene", name_},
+                    {"set", bench::name_of(rays.set)},
+                    {"device", "cuda"},
+                    {"device_name", gpu_->name()},
+                    {"rays", rays.rays.size()},
+                    {"launches", seconds.size()},
+                    {"mrays_per_s", mrays(spread.lowest)},
+                    {"mrays_per_s_median", mrays(spread.median)},
+                    {"mrays_per_s_lowest", mrays(spread.highest)},
+                    {"differing_hits", differing}});
     return true;
   }
 
@@ -160,13 +207,24 @@ class SceneBench {
   scene::Scene scene_;
   octree::Octree octree_;
   std::optional<EmbreePeer> peer_;
+  std::unique_ptr<RayGpu> gpu_;
 };
 
 int run(const Options& options) {
   int width = 0, height = 0;
-  if (std::sscanf(options.size.c_str(), "%dx%d", &width, &height) != 2 || width < 1 || height < 1) {
-    fmt::print(stderr, "octrace-bench: --size needs WxH\n");
-    return 2;
+  if (!parse_size(options.size, &width, &height)) return 2;
+  const util::Result<render::DeviceChoice> device = render::parse_device(options.device);
+  if (!device) return fail(device.error());
+  const bool gpu = device->kind == render::DeviceKind::cuda;
+  if (device->kind == render::DeviceKind::automatic || (gpu && !options.peer.empty())) {
+    return fail({util::Exit::usage, "",
+                 "--device needs cpu or cuda[:N]; --peer runs on the CPU only", "", ""});
+  }
+  if (gpu) {
+    const std::string unavailable = render::cuda_unavailable(device->index);
+    if (!unavailable.empty()) {
+      return fail({util::Exit::unsupported, "", unavailable, "", ""});
+    }
   }
   nlohmann::json rows = nlohmann::json::array();
   for (const std::string& name : options.scenes) {
@@ -181,6 +239,11 @@ int run(const Options& options) {
     if (!octree) return fail(octree.error());
     SceneBench bench(options, name.substr(name.find_last_of('/') + 1), std::move(*scene),
                      std::move(*octree));
+    if (gpu) {
+      if (util::Result<void> ready = bench.use_gpu(device->index); !ready) {
+        return fail(ready.error());
+      }
+    }
     if (!bench.run(scene::make_ray_camera(*camera, width, height), width, height, rows)) return 1;
   }
   return write_json(options.json, rows);
@@ -208,8 +271,16 @@ void add_rays_command(CLI::App& app, int& exit_code) {
   command->add_option("--repeats", options->repeats, "Timed runs a row")
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
-  command->add_option("--peer", options->peer, "Trace the same rays with this library, turn about")
-      ->check(CLI::IsMember({"embree"}));
+  command
+      ->add_option("--device", options->device,
+                   "cpu, cuda or cuda:N; on a GPU the best of at least 10 launches counts")
+      ->capture_default_str();
+  if (EmbreePeer::available()) {
+    command
+        ->add_option("--peer", options->peer,
+                     "Trace the same rays with this library on the CPU, turn about")
+        ->check(CLI::IsMember({"embree"}));
+  }
   command->add_flag("--count", options->count, "Count nodes and triangles tested a ray");
   command->add_option("--json", options->json, "Write the rows to this file");
   command->callback([options, &exit_code] { exit_code = run(*options); });

@@ -111,6 +111,8 @@ struct EmbreePeer::Impl {
   }
 };
 
+bool EmbreePeer::available() { return true; }
+
 EmbreePeer::EmbreePeer(const scene::Scene& scene, Quality quality, unsigned threads)
     : impl_(std::make_unique<Impl>()) {
   const std::string config = "threads=" + std::to_string(threads) + ",user_threads=0";

@@ -15,6 +15,8 @@ class EmbreePeer {
   enum class Quality { medium, high };
   enum class Interface { single, packet, stream };
 
+  static bool available();  // was this program built with Embree?
+
   EmbreePeer(const scene::Scene& scene, Quality quality, unsigned threads);
   ~EmbreePeer();
   double build_seconds() const { return build_seconds_; }

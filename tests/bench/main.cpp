@@ -1,6 +1,8 @@
 // octrace-bench: measures; octrace itself links none of it.
 #include <fmt/format.h>
 
+#include <cstdio>
+
 #include "backend/util/atomic_file.h"
 #include "tests/bench/commands.h"
 
@@ -17,14 +19,24 @@ int write_json(const std::string& path, const nlohmann::json& rows) {
   return written ? 0 : fail(written.error());
 }
 
+bool parse_size(const std::string& text, int* width, int* height) {
+  constexpr int kMost = 32768;
+  char rest = 0;
+  const bool ok = std::sscanf(text.c_str(), "%dx%d%c", width, height, &rest) == 2 && *width >= 1 &&
+                  *height >= 1 && *width <= kMost && *height <= kMost;
+  if (!ok) fmt::print(stderr, "octrace-bench: error: --size needs WxH, at most {}\n", kMost);
+  return ok;
+}
+
 }  // namespace octrace::bench
 
 int main(int argc, char** argv) {
-  CLI::App app("Measures octrace: ray throughput and octree builds, beside Embree");
+  CLI::App app("Measures octrace: rays, octree builds and the seed paper's experiment");
   app.require_subcommand(1);
   int exit_code = 0;
   octrace::bench::add_rays_command(app, exit_code);
   octrace::bench::add_build_command(app, exit_code);
+  octrace::bench::add_paper_command(app, exit_code);
   CLI11_PARSE(app, argc, argv);
   return exit_code;
 }
