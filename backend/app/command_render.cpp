@@ -123,8 +123,7 @@ util::Result<kernels::Vec3> parse_sky(const std::string& text) {
     const std::size_t comma = text.find(',', begin);
     const bool last = comma == std::string::npos;
     float value = 0.0f;
-    const bool number =
-        CLI::detail::lexical_cast(text.substr(begin, last ? last : comma - begin), value);
+    const bool number = CLI::detail::lexical_cast(text.substr(begin, comma - begin), value);
     if (!number || last != (c == 2) || !std::isfinite(value) || value < 0.0f) {
       return usage_error(
           fmt::format("--sky: '{}' is not three numbers of 0 or more, such as 0.5,0.6,0.7", text));

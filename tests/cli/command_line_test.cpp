@@ -112,7 +112,7 @@ INSTANTIATE_TEST_SUITE_P(
         render({"--nonsense"}, "--nonsense")));
 
 INSTANTIATE_TEST_SUITE_P(Words, WrongCommandLine,
-                         ::testing::Values(render({"--device", "gpu"}, "auto|cpu|cuda"),
+                         ::testing::Values(render({"--device", "gpu"}, "auto, cpu, cuda"),
                                            render({"--builder", "bvh"}, "median|sah"),
                                            render({"--cull", "1"}, "spec|none"),
                                            render({"--alpha", "x"}, "spec|ignore"),
