@@ -179,6 +179,7 @@ Result<void> run_scenes(State& run) {
       batch = std::move(*next);
     }
     if (auto added = add_scene(run, source, *batch); !added) {
+      if (util::interrupt_signal() != 0) return added.error();
       Comparison comparison;
       comparison.scene = label(source, run.request.sources);
       comparison.first = comparison.second = "octrace";

@@ -75,6 +75,14 @@ TEST(Planes, AlphaAloneGivesTheMask) {
   EXPECT_TRUE(planes->z.empty());
 }
 
+TEST(Planes, AnOpaquePictureHasNoSilhouette) {
+  const auto planes = planes_from_image(
+      image_of(2, 1, {{"R", {0, 1}}, {"G", {0, 1}}, {"B", {0, 1}}, {"A", {1, 1}}}), "p.png");
+  ASSERT_TRUE(planes);
+  EXPECT_TRUE(planes->mask.empty());
+  EXPECT_EQ(planes->rgb.size(), 6u);
+}
+
 TEST(Planes, DepthBehindTheMaskIsNothing) {
   const auto planes = planes_from_image(image_of(2, 1, {{"A", {1, 0}}, {"Z", {1, 0}}}), "e.exr");
   ASSERT_TRUE(planes);

@@ -154,6 +154,27 @@ TEST_F(Compare, EqualAndDifferentImages) {
             0);
 }
 
+TEST_F(Compare, APictureInSrgbIsTheSameAsInLinearLight) {
+  std::vector<float> rgba;
+  for (int i = 0; i < 64 * 48; ++i) {
+    for (const float value : {float(i % 64) / 64, float(i / 64) / 48, 0.25f, 1.0f}) {
+      rgba.push_back(value);
+    }
+  }
+  image::ImageView view;
+  view.width = 64;
+  view.height = 48;
+  for (std::size_t c = 0; c < 4; ++c) {
+    view.channels.push_back({std::string(1, "RGBA"[c]), image::SampleType::float32, &rgba[c], 16});
+  }
+  ASSERT_TRUE(image::write_exr(file("a.exr"), view));
+  ASSERT_TRUE(image::write_integer(file("a.png"), view, image::Encoding::srgb8, 1.0));
+  const Outcome outcome =
+      run({"compare", "a.png", "a.exr", "--tolerance", "rmse=0.003", "--tolerance", "flip=0.01"});
+  EXPECT_EQ(outcome.code, 0) << outcome.text;
+  EXPECT_NE(outcome.text.find("FLIP"), std::string::npos) << outcome.text;
+}
+
 TEST_F(Compare, MissingAndUnreadableImages) {
   write_depth(file("a.exr"), disc());
   EXPECT_EQ(run({"compare", "a.exr", "missing.exr"}).code, 5);

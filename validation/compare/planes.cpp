@@ -123,6 +123,10 @@ Result<Planes> planes_from_image(const image::Image& image, const std::string& f
     for (std::size_t i = 0; i < planes.z.size(); ++i) {
       if (!planes.mask[i]) planes.z[i] = kInfinity;
     }
+    // A picture that is opaque throughout has no silhouette.
+    const bool opaque =
+        std::all_of(planes.mask.begin(), planes.mask.end(), [](auto m) { return m; });
+    if (!depth && opaque && has_rgb) planes.mask.clear();
   } else if (depth) {
     planes.mask.resize(pixels);
     for (std::size_t i = 0; i < pixels; ++i) planes.mask[i] = std::isfinite(planes.z[i]);

@@ -1,5 +1,6 @@
 #include "validation/compare/read_planes.h"
 
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -13,6 +14,19 @@ using util::Exit;
 using util::Result;
 
 constexpr std::size_t kMaxSideFile = 1 << 20;
+
+// Formats of 8 or 16 bits hold sRGB, and the metrics are defined on linear values.
+bool holds_srgb(const std::string& path) {
+  std::string extension = std::filesystem::path(path).extension().string();
+  for (char& c : extension) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  return extension != ".exr" && extension != ".hdr" && extension != ".pfm";
+}
+
+void make_linear(std::vector<float>& samples) {
+  for (float& v : samples) {
+    v = v <= 0.04045f ? v / 12.92f : std::pow((v + 0.055f) / 1.055f, 2.4f);
+  }
+}
 
 // The far distance that the side file states, if it is one and speaks of this image.
 std::optional<double> povray_far_distance(const std::string& path) {
@@ -46,6 +60,7 @@ Result<PlanesFile> read_planes(const std::string& path, const util::Limits& limi
   }
   auto planes = planes_from_image(*image, path);
   if (!planes) return planes.error();
+  if (holds_srgb(path)) make_linear(planes->rgb);
   const bool blender = planes->depth_channel.find(".Depth.") != std::string::npos;
   return PlanesFile{std::move(*planes), blender ? Writer::blender : Writer::unknown};
 }

@@ -75,8 +75,10 @@ Result<void> fill_comparison(Comparison& comparison, const Planes& a, const Plan
 }
 
 std::string one_line(const Comparison& comparison) {
-  std::string line = fmt::format("{:<9} {}  {}  {}", status_name(comparison.status),
-                                 comparison.scene, comparison.camera, comparison.second);
+  std::string line = fmt::format("{:<9} {}", status_name(comparison.status), comparison.scene);
+  for (const std::string& part : {comparison.camera, comparison.second}) {
+    if (!part.empty()) line += "  " + part;
+  }
   if (comparison.geometry) {
     const GeometryMetrics& m = *comparison.geometry;
     line += fmt::format("  mask {} px ({} far), IoU {:.6f}", m.mask_total, m.mask_far, m.iou);
