@@ -85,15 +85,28 @@ struct TransmittanceLeaf {
   }
 };
 
+OCTRACE_HD OCTRACE_FORCE_INLINE ClosestLeaf closest_leaf(const SceneView& scene,
+                                                         const RenderParams& params,
+                                                         const Walk& walk, const Ray& ray) {
+  return {scene,    params,
+          walk.ray, make_triangle_ray(ray.direction),
+          ray.tmin, {ray.tmax, 0.0f, 0.0f, kNone}};
+}
+
+OCTRACE_HD OCTRACE_FORCE_INLINE TransmittanceLeaf transmittance_leaf(const SceneView& scene,
+                                                                     const RenderParams& params,
+                                                                     const Walk& walk,
+                                                                     const Ray& ray) {
+  return {scene, params, walk.ray, make_triangle_ray(ray.direction), ray.tmin, 0u};
+}
+
 template <class ChildTest>
 OCTRACE_HD OCTRACE_FORCE_INLINE TraceStatus closest_hit(const SceneView& scene,
                                                         const RenderParams& params, const Ray& ray,
                                                         const ChildTest& child_test, Hit* hit) {
-  const SlabRay slab_ray = make_slab_ray(ray);
-  ClosestLeaf leaf{scene,    params,
-                   slab_ray, make_triangle_ray(ray.direction),
-                   ray.tmin, {ray.tmax, 0.0f, 0.0f, kNone}};
-  const TraceStatus status = traverse(scene.octree, ray, slab_ray, child_test, leaf);
+  Walk walk(scene.octree, ray);
+  ClosestLeaf leaf = closest_leaf(scene, params, walk, ray);
+  const TraceStatus status = traverse(scene.octree, walk, child_test, leaf);
   *hit = leaf.hit;
   return status;
 }
@@ -104,9 +117,9 @@ OCTRACE_HD OCTRACE_FORCE_INLINE TraceStatus shadow_transmittance(const SceneView
                                                                  const Ray& ray,
                                                                  const ChildTest& child_test,
                                                                  float* transmittance) {
-  const SlabRay slab_ray = make_slab_ray(ray);
-  TransmittanceLeaf leaf{scene, params, slab_ray, make_triangle_ray(ray.direction), ray.tmin, 0u};
-  const TraceStatus status = traverse(scene.octree, ray, slab_ray, child_test, leaf);
+  Walk walk(scene.octree, ray);
+  TransmittanceLeaf leaf = transmittance_leaf(scene, params, walk, ray);
+  const TraceStatus status = traverse(scene.octree, walk, child_test, leaf);
   *transmittance = leaf.transmittance();
   return status;
 }

@@ -1,4 +1,4 @@
-// Walks the octree front to back.
+// Walks through the octree.
 #pragma once
 
 #include "kernels/box.h"
@@ -69,49 +69,99 @@ struct ScalarChildTest {
   }
 };
 
-// Calls leaf(index of a leaf triangle, tmax) -> bool for the triangles whose boxes the ray meets
-// between ray.tmin and tmax, near children first. The functor lowers tmax when it takes a hit, and
-// returns true to end the walk (any-hit queries).
+// A walk through the octree, front to back, one node at a time, so that a kernel may pause a ray
+// between nodes and take another. next_node() visits a node; the triangles whose boxes the ray
+// meets there wait in `triangles`, and are to be taken with next_triangle() before the walk goes
+// on.
 //
 // The stack cannot overflow: a push leaves the unvisited siblings of one node, so at most one entry
 // a level, and builders stop at kMaxDepth levels. Every node is reached once, so a walk of more
 // steps than there are nodes has met a cycle. Both are checked all the same.
-template <class ChildTest, class Leaf>
-OCTRACE_HD OCTRACE_FORCE_INLINE TraceStatus traverse(const OctreeView& octree, const Ray& ray,
-                                                     const SlabRay& slab_ray,
-                                                     const ChildTest& child_test, Leaf& leaf) {
-  struct Group {
-    std::uint32_t first_child;
-    std::uint32_t pending;  // bits 24-31: children to visit; bits 0-7: the node's inner_mask
-  };
-  if (octree.nodes.empty()) return TraceStatus::ok;
-  Group stack[kMaxDepth];
-  int depth = 0;
-  const std::uint32_t flip = slab_ray.octant ^ 7u;
-  Group group{0, (1u << (24 + flip)) | 1u};  // the root, as the child in slot 0 of nothing
-  float tmax = ray.tmax;
-  std::uint64_t budget = octree.nodes.size;
-  for (;;) {
-    const int bit = highest_bit(group.pending);
-    group.pending &= ~(1u << bit);
-    const std::uint32_t slot = (static_cast<std::uint32_t>(bit) - 24u) ^ flip;
-    const std::uint32_t before = group.pending & 0xffu & ((1u << slot) - 1u);
-    const Node& node = octree.nodes[group.first_child + count_bits(before)];
-    if (group.pending & kInnerBits) {
-      if (depth == kMaxDepth) return TraceStatus::stack_overflow;
-      stack[depth++] = group;
-    }
-    if (budget-- == 0) return TraceStatus::step_budget;
-    const ChildHits hits = child_test(node, slab_ray, ray.tmin, tmax);
-    group = {node.first_child, (hits & kInnerBits) | node.inner_mask};
-    for (std::uint32_t bits = hits & kTriangleBits; bits != 0; bits &= bits - 1) {
-      if (leaf(node.first_triangle + lowest_bit(bits), tmax)) return TraceStatus::ok;
-    }
+//
+// The stack is an array of its own, because an array that is indexed at run time would take the
+// walk's other members with it into memory.
+struct WalkGroup {
+  std::uint32_t first_child;
+  std::uint32_t pending;  // bits 24-31: children to visit; bits 0-7: the node's inner_mask
+};
+using WalkStack = WalkGroup[kMaxDepth];
+
+struct Walk {
+  SlabRay ray;
+  float tmin, tmax;  // tmax shrinks as hits are found
+  WalkGroup group;
+  std::uint32_t first_triangle;
+  std::uint32_t triangles;  // bits 0-23, from first_triangle
+  std::uint32_t budget;
+  int depth;
+  TraceStatus status;
+
+  OCTRACE_HD OCTRACE_FORCE_INLINE Walk(const OctreeView& octree, const Ray& from) {
+    restart(octree, from);
+  }
+
+  OCTRACE_HD OCTRACE_FORCE_INLINE void restart(const OctreeView& octree, const Ray& from) {
+    ray = make_slab_ray(from);
+    tmin = from.tmin;
+    tmax = from.tmax;
+    // The root, as the child in slot 0 of nothing; nothing to visit in an empty tree.
+    group = {0, octree.nodes.empty() ? 0u : (1u << (24 + (ray.octant ^ 7u))) | 1u};
+    triangles = 0;
+    budget = static_cast<std::uint32_t>(octree.nodes.size);
+    depth = 0;
+    status = TraceStatus::ok;
+  }
+
+  // False: the walk is over, because nothing is left or because status is no longer ok.
+  template <class ChildTest>
+  OCTRACE_HD OCTRACE_FORCE_INLINE bool next_node(const OctreeView& octree,
+                                                 const ChildTest& child_test, WalkStack& stack) {
     if (!(group.pending & kInnerBits)) {
-      if (depth == 0) return TraceStatus::ok;
+      if (depth == 0) return false;
       group = stack[--depth];
     }
+    const int bit = highest_bit(group.pending);
+    group.pending &= ~(1u << bit);
+    if (group.pending & kInnerBits) {
+      if (depth == kMaxDepth) return fail(TraceStatus::stack_overflow);
+      stack[depth++] = group;
+    }
+    if (budget-- == 0) return fail(TraceStatus::step_budget);
+    const std::uint32_t slot = (static_cast<std::uint32_t>(bit) - 24u) ^ ray.octant ^ 7u;
+    const std::uint32_t before = group.pending & 0xffu & ((1u << slot) - 1u);
+    const Node& node = octree.nodes[group.first_child + count_bits(before)];
+    const ChildHits hits = child_test(node, ray, tmin, tmax);
+    group = {node.first_child, (hits & kInnerBits) | node.inner_mask};
+    first_triangle = node.first_triangle;
+    triangles = hits & kTriangleBits;
+    return true;
   }
+
+  OCTRACE_HD OCTRACE_FORCE_INLINE std::uint32_t next_triangle() {
+    const int bit = lowest_bit(triangles);
+    triangles &= triangles - 1;
+    return first_triangle + static_cast<std::uint32_t>(bit);
+  }
+
+ private:
+  OCTRACE_HD bool fail(TraceStatus why) {
+    status = why;
+    return false;
+  }
+};
+
+// Calls leaf(index of a leaf triangle, tmax) -> bool for the triangles whose boxes the ray meets.
+// The functor lowers tmax when it takes a hit, and returns true to end the walk (any-hit queries).
+template <class ChildTest, class Leaf>
+OCTRACE_HD OCTRACE_FORCE_INLINE TraceStatus traverse(const OctreeView& octree, Walk& walk,
+                                                     const ChildTest& child_test, Leaf& leaf) {
+  WalkStack stack;
+  while (walk.next_node(octree, child_test, stack)) {
+    while (walk.triangles != 0) {
+      if (leaf(walk.next_triangle(), walk.tmax)) return TraceStatus::ok;
+    }
+  }
+  return walk.status;
 }
 
 }  // namespace octrace::kernels

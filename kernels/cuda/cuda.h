@@ -60,6 +60,7 @@ Status elapsed(Event start, Event stop, float* milliseconds);  // waits for stop
 // What a launch reports beside its pixels, in device memory, zeroed before the launch.
 struct Report {
   unsigned long long beauty_rays, shadow_rays;
+  unsigned long long next_ray;  // of launch_rays: the first ray that no warp has taken yet
   std::uint32_t status;  // TraceStatus of a pixel that failed; 0: none
   std::uint32_t x, y;    // that pixel
 };
