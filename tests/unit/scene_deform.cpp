@@ -5,6 +5,7 @@
 #include <glm/gtc/quaternion.hpp>
 #include <random>
 
+#include "backend/scene/deform.h"
 #include "tests/unit/scene_support.h"
 
 namespace octrace::scene {
@@ -115,6 +116,18 @@ TEST(SceneDeform, SkinsAgreeWithTheFormula) {
       EXPECT_NEAR(agreement, 1.0, 1e-5) << v;
     }
   }
+}
+
+TEST(SceneDeform, WeightsAreBroughtToASumOfOne) {
+  SkinBinding binding;
+  binding.joints = {{0, 1, 0, 0, 1, 0, 0, 0}, {2, 0, 0, 0, 0, 0, 0, 0}};
+  binding.weights = {{0.5f, 1.0f, 0, 0, 0, 0, 0, 0}, {0.5f, 0, 0, 0, 0, 0, 0, 0}};
+  std::vector<dmat4> joints;
+  for (const dvec3& t : {dvec3(8, 0, 0), dvec3(0, 8, 0), dvec3(0, 0, 8)}) {
+    joints.push_back(glm::translate(dmat4(1.0), t));
+  }
+  EXPECT_EQ(blend_joints(binding, joints, 0)[3], dvec4(2, 4, 2, 1));
+  EXPECT_EQ(blend_joints(binding, joints, 1), joints[1]) << "without weights: its first joint";
 }
 
 TEST(SceneDeform, MirroredSkeletonsSwapTheWinding) {

@@ -302,21 +302,24 @@ TEST(SceneFlatten, LimitsNameTheirOption) {
   EXPECT_TRUE(flatten(document, options));
 }
 
-TEST(SceneFlatten, CountsWithoutDataDoNotTakeMemory) {
-  // An accessor without a buffer view is all zeros: 24 GB of positions in 300 bytes of file.
+TEST(SceneFlatten, CountsWithoutDataAreLimitedBeforeTheyAreRead) {
+  // An accessor without a buffer view is all zeros: 24 MB of positions in 300 bytes of file.
   GltfFile file;
   const int accessor = file.append("accessors", {{"componentType", 5126},
                                                  {"type", "VEC3"},
-                                                 {"count", 2'000'000'000},
+                                                 {"count", 2'000'000},
                                                  {"min", {0, 0, 0}},
                                                  {"max", {0, 0, 0}}});
   file.append("meshes",
               {{"primitives", json::array({{{"attributes", {{"POSITION", accessor}}}}})}});
   file.append("nodes", {{"mesh", 0}});
   file.append("scenes", {{"nodes", {0}}});
-  auto document = file.load();
-  const auto exit = document ? flatten(*document, {}).error().exit : document.error().exit;
-  EXPECT_EQ(exit, util::Exit::limit) << (document ? "" : document.error().to_string());
+  FlattenOptions options;
+  options.limits.max_scene_bytes = 20 << 20;
+  const auto scene = flatten(file.document(), options);
+  ASSERT_FALSE(scene);
+  EXPECT_EQ(scene.error().exit, util::Exit::limit);
+  EXPECT_NE(scene.error().message.find("--max-scene-bytes"), std::string::npos);
 }
 
 TEST(SceneFlatten, CamerasStandAtTheirNodes) {
