@@ -48,8 +48,20 @@ CameraFrame camera_frame(const scene::Camera& camera, int width, int height) {
     frame.orthographic = camera.type == scene::CameraType::orthographic;
     frame.top = frame.orthographic ? camera.ymag : std::tan(0.5 * camera.yfov);
     frame.bottom = -frame.top;
-    frame.right_edge = frame.top * width / height;
+    frame.right_edge = std::abs(frame.top) * width / height;
+    if (frame.orthographic) frame.right_edge = std::copysign(frame.right_edge, camera.xmag);
     frame.left = -frame.right_edge;
+  }
+  // Borders in the wrong order are a view along axes the other way round.
+  if (frame.right_edge < frame.left) {
+    frame.right = -frame.right;
+    frame.left = -frame.left;
+    frame.right_edge = -frame.right_edge;
+  }
+  if (frame.top < frame.bottom) {
+    frame.up = -frame.up;
+    frame.bottom = -frame.bottom;
+    frame.top = -frame.top;
   }
   return frame;
 }

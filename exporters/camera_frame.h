@@ -9,10 +9,11 @@
 namespace octrace::exporters {
 
 struct CameraFrame {
-  // Orthonormal, in the world; mirrored where the camera's matrix mirrors.
+  // Orthonormal, in the world; mirrored where the camera's matrix or magnitudes mirror.
   glm::dvec3 right{1, 0, 0}, up{0, 1, 0}, back{0, 0, 1};
   glm::dvec3 eye{0.0};
-  // The image's borders in the plane at depth 1 (orthographic: at any depth), along right and up.
+  // The image's borders in the plane at depth 1 (orthographic: at any depth), along right and up:
+  // left < right_edge, bottom < top.
   double left = -1, right_edge = 1, bottom = -1, top = 1;
   bool orthographic = false;
 

@@ -52,7 +52,8 @@ std::string file_stem(const std::string& source) {
                                ? source.substr(scene::kBuiltinPrefix.size())
                                : exporters::path_parts(source).stem;
   const std::string stem = exporters::path_parts(name).safe_stem;
-  return stem.empty() || stem.front() == '.' || stem.front() == '-' ? "scene" + stem : stem;
+  return stem.empty() || stem.front() == '.' || stem.front() == '-' ? fmt::format("scene{}", stem)
+                                                                    : stem;
 }
 
 util::Result<std::vector<NamedCamera>> cameras_of(const ExportOptions& options,

@@ -31,14 +31,15 @@ struct BlenderScene {
 // each pixel's centre:
 //   ViewLayer.Combined.A   mask: exactly 0 or 1 (R, G, B: white where hit)
 //   ViewLayer.Depth.Z      planar depth in metres; 1e10 where nothing is hit
-//   ViewLayer.IndexOB.X    glTF node index + 1 (its low 15 bits: Blender holds no more); 0:
-//   background ViewLayer.Normal.*     shading normal, ViewLayer.Position.*: both in Blender's axes,
-//   which are
-//                          (x, -z, y) of glTF's
+//   ViewLayer.IndexOB.X    glTF node index + 1, the low 15 bits that Blender holds; 0: background
+//   ViewLayer.Normal.*     shading normal
+//   ViewLayer.Position.*   point; both in Blender's axes, which are (x, -z, y) of glTF's
 // The script prints "octrace: rendered PATH" after each image, "octrace: failed FILE: reason" for a
 // scene or view that failed (the others go on), and raises at its end if any did, so that Blender
 // exits with the code of --python-exit-code. An output is whole or absent; an old one is removed
-// before anything else happens.
+// before anything else happens. A camera that mirrors fails: Blender has none.
+// Known difference: where a texture's two wrap modes differ, Blender's importer does not filter
+// across the seam, so alpha mode MASK may cut half a texel elsewhere there.
 inline constexpr double kBlenderBackgroundDepth = 1e10;
 inline constexpr std::uint32_t kBlenderMaxObject = 32767;
 

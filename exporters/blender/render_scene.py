@@ -188,6 +188,8 @@ def set_camera(scene, view):
     scene.collection.objects.link(camera)
     columns = view["matrix"]
     matrix = Matrix([[columns[4 * column + row] for column in range(4)] for row in range(4)])
+    if matrix.determinant() < 0:
+        raise RuntimeError("a mirrored camera, which Blender does not have")
     camera.matrix_world = TO_BLENDER @ matrix
     width, height = view["width"], view["height"]
     across = view["right"] - view["left"]

@@ -68,7 +68,11 @@ void append_cameras(GltfJob& job, Json& roots) {
       job.note("a pinhole camera without an image size was left out");
       continue;
     }
-    const CameraFrame frame = camera_frame(camera, 1, 1);
+    // The magnitudes keep their signs in the record, so they must not turn the axes too.
+    scene::Camera upright = camera;
+    upright.xmag = std::abs(camera.xmag);
+    upright.ymag = std::abs(camera.ymag);
+    const CameraFrame frame = camera_frame(upright, 1, 1);
     const glm::dmat3 axes(frame.right, frame.up, frame.back);
     if (glm::determinant(axes) < 0.0) job.note("a mirrored camera lost its mirroring");
     const glm::dmat3 proper(glm::cross(frame.up, frame.back), frame.up, frame.back);

@@ -208,8 +208,8 @@ void append_scene_mesh(std::string& out, Job& job, std::uint32_t index) {
   std::string texture = fmt::format("texture {{ Material{} }}\n", geometry.material);
   if (geometry.colors != kernels::kNone) {
     if (style.uv == nullptr && !is_cut(job, material)) {
+      // The material itself stays: POV-Ray wants a texture outside where there is one inside.
       add_vertex_colors(job, geometry, style);
-      texture.clear();
     } else {
       job.note("vertex colours are left out where a texture is");
     }

@@ -11,4 +11,5 @@ octrace_test(octrace_exporters_programs_test
   LIBRARIES octrace_exporters octrace_scene octrace_gltf octrace_image
   LABELS validation)
 target_compile_definitions(octrace_exporters_programs_test PRIVATE
-  OCTRACE_TEST_CACHE="${CMAKE_BINARY_DIR}/test_cache")
+  OCTRACE_TEST_CACHE="${CMAKE_BINARY_DIR}/test_cache"
+  OCTRACE_EXPORT_SCENE="${CMAKE_SOURCE_DIR}/exporters/blender/export_scene.py")

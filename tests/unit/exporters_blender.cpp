@@ -2,10 +2,16 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <glm/geometric.hpp>
+#include <nlohmann/json.hpp>
 
+#include "backend/gltf/document.h"
 #include "backend/image/image.h"
+#include "backend/scene/flatten.h"
 #include "exporters/gltf/gltf.h"
 #include "tests/unit/exporters_programs.h"
 #include "tests/unit/exporters_scene.h"
@@ -115,6 +121,102 @@ TEST(Blender, ShowsWhatARayCasterShows) {
   for (const auto& entry : std::filesystem::directory_iterator(folder.path())) {
     EXPECT_NE(entry.path().filename().string().substr(0, 9), ".octrace-") << entry.path();
   }
+}
+
+constexpr const char* kMakeBlend = R"py(
+import bpy, math, os
+from mathutils import Matrix
+scene = bpy.context.scene
+scene.render.resolution_x, scene.render.resolution_y = 800, 400
+scene.frame_start, scene.frame_end = 3, 9
+for item in list(bpy.data.objects):
+    bpy.data.objects.remove(item)
+bpy.ops.mesh.primitive_cube_add(location=(1, 2, 3))
+cube = bpy.context.object
+cube.name = "moved cube"
+cube.modifiers.new("split", "SUBSURF").subdivision_type = "SIMPLE"
+def camera(name, kind):
+    data = bpy.data.cameras.new(name)
+    data.type = kind
+    item = bpy.data.objects.new(name, data)
+    scene.collection.objects.link(item)
+    item.matrix_world = Matrix.Translation((0, -10, 1)) @ Matrix.Rotation(math.pi / 2, 4, "X")
+    return data
+wide = camera("wide", "PERSP")  # sensor 36 mm across the image's larger side
+wide.lens = 36.0
+tall = camera("tall", "PERSP")
+tall.sensor_fit, tall.sensor_height, tall.lens = "VERTICAL", 20.0, 20.0
+flat = camera("flat", "ORTHO")
+flat.sensor_fit, flat.ortho_scale = "VERTICAL", 6.0
+bpy.ops.wm.save_as_mainfile(filepath=os.path.abspath("still.blend"))
+cube.keyframe_insert("location", frame=3)
+cube.location.x = 5
+cube.keyframe_insert("location", frame=9)
+bpy.ops.wm.save_as_mainfile(filepath=os.path.abspath("moving.blend"))
+)py";
+
+void export_blend(const std::string& folder, const std::string& name) {
+  const int code = run_in(folder, "blender",
+                          {"-b", name + ".blend", "-noaudio", "--python-exit-code", "3", "-P",
+                           OCTRACE_EXPORT_SCENE, "--", "out", "--aovs", "Z,mask"});
+  ASSERT_EQ(code, 0) << read_text(folder + "/blender.log");
+}
+
+TEST(Blender, TurnsItsOwnFilesIntoScenesAndJobs) {
+  if (!installed("blender")) GTEST_SKIP() << "blender is not installed";
+  const TemporaryFolder folder;
+  std::ofstream(folder.file("make.py")) << kMakeBlend;
+  ASSERT_EQ(
+      run_in(folder.path(), "blender",
+             {"-b", "--factory-startup", "-noaudio", "--python-exit-code", "3", "-P", "make.py"}),
+      0)
+      << read_text(folder.file("blender.log"));
+  export_blend(folder.path(), "still");
+  export_blend(folder.path(), "moving");
+
+  const auto still = nlohmann::json::parse(read_text(folder.file("out/still.job.json")));
+  const auto moving = nlohmann::json::parse(read_text(folder.file("out/moving.job.json")));
+  EXPECT_EQ(still["version"], 1);
+  EXPECT_EQ(still["scenes"], nlohmann::json::array({"still.glb"}));
+  EXPECT_EQ(still["size"], nlohmann::json::array({800, 400}));
+  EXPECT_EQ(still["aovs"], nlohmann::json::array({"Z", "mask"}));
+  EXPECT_FALSE(still.contains("frames"));
+  EXPECT_EQ(moving["frames"], "3-9");
+  EXPECT_EQ(moving["fps"], 24);
+  EXPECT_EQ(still["cameras"].size(), 3u);
+
+  const auto document = gltf::load(folder.file("out/still.glb"), {});
+  ASSERT_TRUE(document) << document.error().to_string();
+  const auto scene = scene::flatten(*document, {});
+  ASSERT_TRUE(scene) << scene.error().to_string();
+  // Blender's (1, 2, 3) is glTF's (1, 3, -2), and the cube reaches 1 from there.
+  EXPECT_EQ(scene->bounds.lower, kernels::Vec3(0, 2, -3));
+  EXPECT_EQ(scene->bounds.upper, kernels::Vec3(2, 4, -1));
+  EXPECT_EQ(scene->triangles.size(), 48u) << "the modifier splits each of six faces in four";
+  int known = 0;
+  for (const scene::Camera& camera : scene->cameras) {
+    EXPECT_NE(std::find(still["cameras"].begin(), still["cameras"].end(), camera.name),
+              still["cameras"].end());
+    // It stands at Blender's (0, -10, 1), glTF's (0, 1, 10), and looks along glTF's -Z.
+    EXPECT_LT(glm::length(camera.matrix[3] - glm::dvec4(0, 1, 10, 1)), 1e-5);
+    EXPECT_LT(glm::length(camera.matrix[2] - glm::dvec4(0, 0, 1, 0)), 1e-5);
+    if (camera.name == "wide") {
+      EXPECT_NEAR(camera.yfov, 2.0 * std::atan(0.25), 1e-6);
+      ++known;
+    }
+    if (camera.name == "tall") {
+      EXPECT_NEAR(camera.yfov, 2.0 * std::atan(0.5), 1e-6);
+      ++known;
+    }
+    if (camera.name == "flat") {
+      EXPECT_NEAR(camera.ymag, 3.0, 1e-6);
+      ++known;
+    }
+  }
+  EXPECT_EQ(known, 3);
+  const auto animated = gltf::load(folder.file("out/moving.glb"), {});
+  ASSERT_TRUE(animated) << animated.error().to_string();
+  EXPECT_EQ(animated->model.animations.size(), 1u);
 }
 
 }  // namespace

@@ -116,6 +116,16 @@ void expect_same_scene(const scene::Scene& a, const scene::Scene& b) {
   for (std::size_t i = 0; i < a.cameras.size(); ++i) {
     EXPECT_EQ(a.cameras[i].name, b.cameras[i].name);
     EXPECT_EQ(a.cameras[i].type, b.cameras[i].type);
+    if (a.cameras[i].type == scene::CameraType::orthographic) {
+      EXPECT_EQ(a.cameras[i].xmag, b.cameras[i].xmag);
+      EXPECT_EQ(a.cameras[i].ymag, b.cameras[i].ymag);
+      EXPECT_EQ(a.cameras[i].zfar, b.cameras[i].zfar);
+    } else {
+      EXPECT_EQ(a.cameras[i].yfov, b.cameras[i].yfov);
+      // glTF has no near plane at the eye itself.
+      const double znear = a.cameras[i].znear;
+      EXPECT_NEAR(b.cameras[i].znear, znear, znear > 0.0 ? 0.0 : 1e-4);
+    }
     for (int c = 0; c < 4; ++c) {
       const glm::dvec4 x = a.cameras[i].matrix[c], y = b.cameras[i].matrix[c];
       EXPECT_LT(glm::length(x - y), 1e-9) << "camera " << i << ", column " << c;
@@ -167,6 +177,7 @@ scene::Scene scene_with_everything() {
   scene.cameras.back().name = "flat";
   scene.cameras.back().type = scene::CameraType::orthographic;
   scene.cameras.back().zfar = 100.0;
+  scene.cameras.back().xmag = -2.0;
   finish(scene);
   return scene;
 }

@@ -76,8 +76,12 @@ TEST_F(Povray, LooksFromInsideAndBehind) {
 TEST_F(Povray, FollowsOrthographicCameras) {
   scene::Camera camera = look_at({3, 2.5, 8}, {0, 0, 0}, 0.5);
   camera.type = scene::CameraType::orthographic;
-  camera.xmag = 99.0;  // ignored: the image's own aspect counts
+  camera.xmag = 99.0;  // only its sign matters: the image's own aspect counts
   camera.ymag = 3.1;
+  expect_agreement(varied_scene(), camera);
+  camera.xmag = -1.0;
+  expect_agreement(varied_scene(), camera);
+  camera.ymag = -3.1;
   expect_agreement(varied_scene(), camera);
 }
 

@@ -27,7 +27,9 @@ CastRay pixel_ray(const scene::Camera& camera, const CastOptions& options, int c
     }
     case scene::CameraType::orthographic:
       local = {0, 0, -1};
-      shift = {(2.0 * px / w - 1.0) * camera.ymag * w / h, (1.0 - 2.0 * py / h) * camera.ymag, 0};
+      // Of xmag only the sign counts.
+      shift = {(2.0 * px / w - 1.0) * std::copysign(camera.ymag, camera.xmag) * w / h,
+               (1.0 - 2.0 * py / h) * camera.ymag, 0};
       break;
     case scene::CameraType::pinhole: {
       const double fit_x = camera.width > 0 ? camera.width / w : 1.0;
