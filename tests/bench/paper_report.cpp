@@ -119,11 +119,15 @@ std::string paper_text(const PaperResult& result) {
     text += fmt::format("{:>6}  {:<26.0f}{:<28.0f}{:>9.1f}\n", p.z, p.cpu_seconds * 1e3,
                         p.gpu_seconds * 1e3, p.cpu_seconds / p.gpu_seconds);
   }
-  text += "\n" + side("Table 1, the seed's algorithm on this machine", result,
-                      &PaperTimes::seed_cpu, &PaperTimes::seed_gpu, &PaperTimes::seed_kernels);
-  text += "\n" + side("Table 1, octrace's own path on this machine", result, &PaperTimes::fast_cpu,
-                      &PaperTimes::fast_gpu, &PaperTimes::fast_kernels);
-  return text + "\n" + figure_data(result);
+  text += '\n';
+  text += side("Table 1, the seed's algorithm on this machine", result, &PaperTimes::seed_cpu,
+               &PaperTimes::seed_gpu, &PaperTimes::seed_kernels);
+  text += '\n';
+  text += side("Table 1, octrace's own path on this machine", result, &PaperTimes::fast_cpu,
+               &PaperTimes::fast_gpu, &PaperTimes::fast_kernels);
+  text += '\n';
+  text += figure_data(result);
+  return text;
 }
 
 nlohmann::json paper_json(const PaperResult& result) {
