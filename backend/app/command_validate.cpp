@@ -12,6 +12,7 @@
 #include "backend/app/command.h"
 #include "backend/app/options.h"
 #include "backend/app/reference_batch.h"
+#include "backend/app/reference_limits.h"
 #include "backend/app/validation_views.h"
 #include "backend/image/image.h"
 #include "backend/util/interrupt.h"
@@ -62,6 +63,7 @@ struct Batch {
   struct Entry {
     std::string scene;
     ValidationView view;
+    ReferenceLimits blender_limits;
   };
   std::vector<Entry> entries;
 };
@@ -103,15 +105,23 @@ void keep_low_bits(validation::Planes& planes) {
 
 void compare_view(State& run, const Batch::Entry& entry, const ReferenceView& reference) {
   const auto compare = [&](const char* name, const Result<validation::Planes>& planes,
-                           const validation::Tolerances& tolerances,
-                           const std::vector<std::string>& notes, bool low_bits) {
+                           const validation::Tolerances& tolerances, const ReferenceLimits& limits,
+                           bool low_bits) {
     Comparison comparison;
     comparison.scene = entry.scene;
     comparison.camera = entry.view.camera.name;
     comparison.first = "octrace";
     comparison.second = name;
-    comparison.notes = notes;
-    if (!planes) return record_failure(run, std::move(comparison), planes.error());
+    comparison.notes = limits.shown_otherwise;
+    if (!planes) {
+      // A program that refuses what it does not know has said so; one that is broken has not.
+      if (limits.refused.empty()) {
+        return record_failure(run, std::move(comparison), planes.error());
+      }
+      comparison.status = Status::exception;
+      comparison.cause = fmt::format("{}", fmt::join(limits.refused, "; "));
+      return record(run, std::move(comparison));
+    }
     validation::CompareOptions options;
     options.tolerances = tolerances;
     options.beauty = false;
@@ -120,9 +130,9 @@ void compare_view(State& run, const Batch::Entry& entry, const ReferenceView& re
     if (low_bits) keep_low_bits(ours);
     auto filled = validation::fill_comparison(comparison, ours, *planes, options);
     if (!filled) return record_failure(run, std::move(comparison), filled.error());
-    if (comparison.status == Status::differ && !notes.empty()) {
+    if (comparison.status == Status::differ && !limits.shown_otherwise.empty()) {
       comparison.status = Status::exception;
-      comparison.cause = fmt::format("{}", fmt::join(notes, "; "));
+      comparison.cause = fmt::format("{}", fmt::join(limits.shown_otherwise, "; "));
     }
     if (comparison.geometry->covered_a == 0 && comparison.geometry->covered_b == 0) {
       comparison.notes.emplace_back("Nothing of the scene is in view of this camera.");
@@ -130,9 +140,11 @@ void compare_view(State& run, const Batch::Entry& entry, const ReferenceView& re
     record(run, std::move(comparison));
   };
   if (reference.povray) {
-    compare("POV-Ray", *reference.povray, run.povray, reference.povray_notes, false);
+    compare("POV-Ray", *reference.povray, run.povray, {reference.povray_notes, {}}, false);
   }
-  if (reference.blender) compare("Blender", *reference.blender, run.blender, {}, true);
+  if (reference.blender) {
+    compare("Blender", *reference.blender, run.blender, entry.blender_limits, true);
+  }
 }
 
 Result<void> add_scene(State& run, const std::string& source, Batch& batch) {
@@ -144,12 +156,14 @@ Result<void> add_scene(State& run, const std::string& source, Batch& batch) {
   if (!session) return session.error();
   auto views = render_views((*session)->scene, (*session)->octree, request.views);
   if (!views) return views.error();
+  auto limits = blender_limits(scene_request, (*session)->scene);
+  if (!limits) return limits.error();
   std::vector<scene::Camera> cameras;
   for (const ValidationView& view : *views) cameras.push_back(view.camera);
   auto added = batch.references.add(scene_request, (*session)->scene, cameras);
   if (!added) return added.error();
   for (ValidationView& view : *views) {
-    batch.entries.push_back({label(source, request.sources), std::move(view)});
+    batch.entries.push_back({label(source, request.sources), std::move(view), *limits});
   }
   return {};
 }
