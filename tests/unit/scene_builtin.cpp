@@ -1,3 +1,4 @@
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -72,7 +73,7 @@ TEST(SceneBuiltin, PaperHasItsCountsItsCamerasAndNoHoles) {
   ASSERT_EQ(scene.cameras.size(), 4u);
   const double distances[] = {700, 600, 500, 400};
   for (int i = 0; i < 4; ++i) {
-    EXPECT_EQ(scene.cameras[i].name, "Z" + std::to_string(static_cast<int>(distances[i])));
+    EXPECT_EQ(scene.cameras[i].name, fmt::format("Z{:g}", distances[i]));
     EXPECT_EQ(scene.cameras[i].matrix[3], glm::dvec4(0, 0, distances[i], 1));
     EXPECT_EQ(make_ray_camera(scene.cameras[i], 800, 600).axis, kernels::Vec3(0, 0, -1));
     // The model fills a part of each image and leaves none.
