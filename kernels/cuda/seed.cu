@@ -16,8 +16,9 @@ __global__ void __launch_bounds__(kBlockSide* kBlockSide)
   if (x >= image.width || y >= end_row) return;
   const Ray ray =
       camera_ray(image.camera, static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f);
-  const TraceStatus status =
-      seed_trace(image.scene, ray, &image.hits[static_cast<std::uint64_t>(y) * image.width + x]);
+  Hit hit;
+  const TraceStatus status = seed_trace(image.scene, ray, &hit);
+  image.hits[static_cast<std::uint64_t>(y) * image.width + x] = hit;
   if (status != TraceStatus::ok) report_failure(report, status, x, y);
 }
 
