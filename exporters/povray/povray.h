@@ -50,10 +50,10 @@ struct PovrayFile {
 };
 
 // Writes PATH (*.pov), in depth mode the alpha maps that it needs, in scene mode the textures, as
-// PNG files named after it, and STEM.json beside it: {"version": 1, "mode": "depth" | "scene",
-// "width", "height", "far": number, "image": "STEM.png", "arguments": [...], "notes": [...]}. Each
-// file is whole or absent. Fails with exit 4 where a scene has more than 65535 objects (depth
-// mode).
+// PNG files named after it, and PATH.json beside it: {"version": 1, "mode": "depth" | "scene",
+// "width", "height", "far": number, "image", "arguments": [...], "notes": [...]}. Each file is
+// whole or absent, the .pov written last. Fails with exit 4 where a scene has more than 65535
+// objects (depth mode).
 util::Result<PovrayFile> write_povray(const scene::Scene& scene, const scene::Camera& camera,
                                       const PovrayOptions& options, const std::string& path);
 
