@@ -78,23 +78,39 @@ void check_indices(const tinygltf::Model& model, const tinygltf::Primitive& prim
   }
 }
 
+struct LargestJoint {
+  std::uint32_t value = 0;
+  std::string pointer;  // empty: the mesh has no joints
+};
+
+LargestJoint largest_joint(const tinygltf::Model& model, std::size_t mesh, LargestValues& largest) {
+  LargestJoint found;
+  const auto& primitives = model.meshes[mesh].primitives;
+  for (std::size_t p = 0; p < primitives.size(); ++p) {
+    for (const auto& [name, accessor] : primitives[p].attributes) {
+      if (!name.starts_with("JOINTS_")) continue;
+      const std::uint32_t value = largest.of(accessor);
+      if (!found.pointer.empty() && value <= found.value) continue;
+      found = {value, fmt::format("/meshes/{}/primitives/{}/attributes/{}", mesh, p, name)};
+    }
+  }
+  return found;
+}
+
+// Many nodes may share a mesh of many primitives, so each mesh is looked through once.
 void check_joints(const tinygltf::Model& model, LargestValues& largest, Issues& issues) {
+  std::vector<std::optional<LargestJoint>> known(model.meshes.size());
   for (const auto& node : model.nodes) {
     if (node.skin < 0) continue;
-    const auto& primitives = model.meshes[static_cast<std::size_t>(node.mesh)].primitives;
+    const auto mesh = static_cast<std::size_t>(node.mesh);
+    if (!known[mesh]) known[mesh] = largest_joint(model, mesh, largest);
+    const LargestJoint& joint = *known[mesh];
     const std::size_t joints = model.skins[static_cast<std::size_t>(node.skin)].joints.size();
-    for (std::size_t p = 0; p < primitives.size(); ++p) {
-      for (const auto& [name, accessor] : primitives[p].attributes) {
-        if (!name.starts_with("JOINTS_")) continue;
-        const std::uint32_t value = largest.of(accessor);
-        if (value < joints) continue;
-        issues.invalid("ACCESSOR_JOINTS_INDEX_OOB",
-                       fmt::format("/meshes/{}/primitives/{}/attributes/{}", node.mesh, p, name),
-                       fmt::format("joint {} needs {} joints, skin {} has {}", value,
-                                   std::uint64_t{value} + 1, node.skin, joints));
-        return;
-      }
-    }
+    if (joint.pointer.empty() || joint.value < joints) continue;
+    issues.invalid("ACCESSOR_JOINTS_INDEX_OOB", joint.pointer,
+                   fmt::format("joint {} needs {} joints, skin {} has {}", joint.value,
+                               std::uint64_t{joint.value} + 1, node.skin, joints));
+    return;
   }
 }
 
@@ -136,10 +152,14 @@ void check_times(const tinygltf::Model& model, Issues& issues) {
 constexpr float kAffineTolerance = 1e-3f;
 
 void check_bind_matrices(const tinygltf::Model& model, Issues& issues) {
+  std::vector<bool> seen(model.accessors.size());
   std::vector<float> values;
   for (std::size_t s = 0; s < model.skins.size(); ++s) {
     const auto& skin = model.skins[s];
     if (skin.inverseBindMatrices < 0) continue;
+    const auto index = static_cast<std::size_t>(skin.inverseBindMatrices);
+    if (seen[index]) continue;
+    seen[index] = true;
     read_floats(model, skin.inverseBindMatrices, values);
     for (std::size_t i = 0; i + 16 <= values.size(); i += 16) {
       const bool affine = std::abs(values[i + 3]) <= kAffineTolerance &&

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <vector>
 
 #include "backend/gltf/accessor.h"
 #include "backend/gltf/links.h"
@@ -72,16 +73,23 @@ void check_skin_links(const tinygltf::Model& model, Issues& issues) {
                                  skin.inverseBindMatrices, matrices.count));
     }
   }
+  // Many nodes may share a mesh of many primitives, so each mesh is looked through once.
+  std::vector<std::size_t> skinned(model.meshes.size());
+  for (std::size_t i = 0; i < model.meshes.size(); ++i) {
+    const auto& primitives = model.meshes[i].primitives;
+    skinned[i] =
+        static_cast<std::size_t>(std::count_if(primitives.begin(), primitives.end(), is_skinned));
+  }
   for (std::size_t i = 0; i < model.nodes.size(); ++i) {
     const auto& node = model.nodes[i];
     if (node.mesh < 0) continue;
-    const auto& primitives = model.meshes[static_cast<std::size_t>(node.mesh)].primitives;
-    if (node.skin >= 0 && !std::all_of(primitives.begin(), primitives.end(), is_skinned)) {
+    const auto mesh = static_cast<std::size_t>(node.mesh);
+    if (node.skin >= 0 && skinned[mesh] < model.meshes[mesh].primitives.size()) {
       issues.warn(
           "NODE_SKIN_WITH_NON_SKINNED_MESH", fmt::format("/nodes/{}/skin", i),
           fmt::format("mesh {} has a primitive without joints, which is not skinned", node.mesh));
     }
-    if (node.skin < 0 && std::any_of(primitives.begin(), primitives.end(), is_skinned)) {
+    if (node.skin < 0 && skinned[mesh] > 0) {
       issues.warn("NODE_SKINNED_MESH_WITHOUT_SKIN", fmt::format("/nodes/{}/mesh", i),
                   fmt::format("mesh {} has joints, the node has no skin", node.mesh));
     }

@@ -52,14 +52,13 @@ void report(const util::Error& error, const std::string& pointer, Issues& issues
   issues.fail(error.exit, error.code, pointer, error.message);
 }
 
-bool has_views(const tinygltf::Model& model, std::size_t buffer) {
-  for (const auto& view : model.bufferViews) {
-    if (static_cast<std::size_t>(view.buffer) == buffer) return true;
-  }
-  return false;
+std::vector<bool> buffers_with_views(const tinygltf::Model& model) {
+  std::vector<bool> used(model.buffers.size());
+  for (const auto& view : model.bufferViews) used[static_cast<std::size_t>(view.buffer)] = true;
+  return used;
 }
 
-void load_buffer(Structure& structure, std::size_t i, std::optional<Bytes>& bin,
+void load_buffer(Structure& structure, std::size_t i, bool has_views, std::optional<Bytes>& bin,
                  const SceneFolder& folder, const util::Limits& limits, Issues& issues) {
   const Source& source = structure.buffers[i];
   const std::string pointer = fmt::format("/buffers/{}", i);
@@ -80,7 +79,7 @@ void load_buffer(Structure& structure, std::size_t i, std::optional<Bytes>& bin,
                   fmt::format("the BIN chunk has {} bytes more than the buffer",
                               data.size() - source.byte_length));
     }
-  } else if (has_views(structure.model, i)) {
+  } else if (has_views) {
     issues.invalid("BUFFER_MISSING_GLB_DATA", pointer,
                    "has neither a uri nor the BIN chunk of a GLB behind it");
     return;
@@ -171,9 +170,10 @@ util::Result<EncodedImage> load_image(const Structure& structure, std::size_t i,
 void load_buffers(Structure& structure, std::optional<Bytes> bin, const SceneFolder& folder,
                   const util::Limits& limits, Issues& issues) {
   Budget budget(limits, issues);
+  const std::vector<bool> used = buffers_with_views(structure.model);
   for (std::size_t i = 0; i < structure.buffers.size() && !issues.failed(); ++i) {
     if (!budget.add(structure.buffers[i].byte_length, fmt::format("/buffers/{}", i))) return;
-    load_buffer(structure, i, bin, folder, limits, issues);
+    load_buffer(structure, i, used[i], bin, folder, limits, issues);
     structure.buffers[i].uri = {};  // a data URI is as large as its bytes
   }
 }
