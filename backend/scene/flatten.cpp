@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <set>
 
 #include "backend/scene/flatten_geometry.h"
 #include "backend/scene/flatten_materials.h"
@@ -43,6 +44,12 @@ util::Result<std::vector<int>> root_nodes(const gltf::Document& document,
     if (!is_child[i]) roots.push_back(static_cast<int>(i));
   }
   return roots;
+}
+
+// Keeps the first of each, in order.
+void drop_duplicates(std::vector<std::string>& lines) {
+  std::set<std::string> seen;
+  std::erase_if(lines, [&](const std::string& line) { return !seen.insert(line).second; });
 }
 
 }  // namespace
@@ -93,6 +100,7 @@ util::Result<Scene> flatten(const gltf::Document& document, const Pose& pose,
   if (auto ok = place_materials(document, options, plan->default_material, scene); !ok) {
     return ok.error();
   }
+  drop_duplicates(scene.warnings);
   scene.object_names.reserve(model.nodes.size());
   for (std::size_t i = 0; i < model.nodes.size(); ++i) {
     scene.object_names.push_back(name_of(model.nodes, i, "node"));
