@@ -2,7 +2,7 @@
 
 #include <iterator>
 
-#include "exporters/png.h"
+#include "backend/image/image.h"
 #include "exporters/povray/parts.h"
 
 namespace octrace::exporters::povray {
@@ -29,15 +29,20 @@ std::string wrapped(const char* i, std::uint32_t size, kernels::Wrap wrap) {
 util::Result<void> append_alpha_function(std::string& out, Job& job, std::uint32_t index) {
   const kernels::Texture& texture = job.scene.textures[index];
   const std::uint64_t count = std::uint64_t{texture.width} * texture.height;
+  // In 16 bits: of the 256 values of an 8-bit map, POV-Ray 3.7 reads 84 as one less.
   std::vector<std::uint32_t> alpha(count);
   for (std::uint64_t i = 0; i < count; ++i) {
-    alpha[i] = job.scene.texels[texture.first_texel + i] >> 24;
+    alpha[i] = (job.scene.texels[texture.first_texel + i] >> 24) * 257;
   }
   const std::string file = fmt::format("{}_alpha_{}.png", job.path.safe_stem, index);
   const std::string path = job.path.folder + file;
-  if (auto written = write_png(path, texture.width, texture.height, alpha, 1); !written) {
-    return written.error();
-  }
+  image::ImageView view;
+  view.width = texture.width;
+  view.height = texture.height;
+  view.channels.push_back({"Y", image::SampleType::uint32, alpha.data(), sizeof(std::uint32_t)});
+  view.metadata.emplace_back("oiio:ColorSpace", "");  // a gamma would be applied
+  auto written = image::write_integer(path, view, image::Encoding::index16, 1.0);
+  if (!written) return written.error();
   job.result.written.push_back(path);
 
   auto to = std::back_inserter(out);

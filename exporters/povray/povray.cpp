@@ -96,7 +96,7 @@ Job make_job(const scene::Scene& scene, const scene::Camera& camera, const Povra
   // A little beyond the farthest point, and so the steps of 2^-30 are as small as they can be.
   job.depth_far = depths.farthest > 0.0 ? depths.farthest * (1.0 + 1e-6) : 1.0;
   job.result.depth_far = job.depth_far / job.fit.scale;
-  // Not STEM.png, which may well be a texture of the scene's.
+  // Not STEM.png and STEM.json, which may well be a texture and a camera of the scene's.
   job.result.image = job.path.stem + "_povray.png";
   job.result.arguments = arguments_of(job);
   return job;
@@ -139,7 +139,7 @@ util::Result<void> write_side_file(Job& job) {
   side["image"] = job.result.image;
   side["arguments"] = job.result.arguments;
   side["notes"] = job.result.notes;
-  const std::string path = job.path.folder + job.path.name + ".json";
+  const std::string path = job.path.folder + job.path.stem + "_povray.json";
   const std::string text =
       side.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
   if (auto written = util::write_file(path, text); !written) return written;

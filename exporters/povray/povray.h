@@ -50,7 +50,8 @@ struct PovrayFile {
 };
 
 // Writes PATH (*.pov), in depth mode the alpha maps that it needs, in scene mode the textures, as
-// PNG files named after it, and PATH.json beside it: {"version": 1, "mode": "depth" | "scene",
+// PNG files named after it, and STEM_povray.json beside the image
+// STEM_povray.png that it describes: {"version": 1, "mode": "depth" | "scene",
 // "width", "height", "far": number, "image", "arguments": [...], "notes": [...]}. Each file is
 // whole or absent, the .pov written last. Fails with exit 4 where a scene has more than 65535
 // objects (depth mode).
