@@ -48,6 +48,17 @@ bool shears(const std::vector<double>& matrix) {
   return false;
 }
 
+// The importer has nodes compute what a sampler of two different wraps does, and lets the image
+// itself clamp: at a seam that repeats, the filter reads the border twice instead of its far side.
+bool filters_across_a_seam(const scene::Scene& scene, const kernels::Material& material) {
+  const std::uint32_t index = material.base_color_texture.texture;
+  if (material.alpha_mode != kernels::AlphaMode::mask || index == kernels::kNone) return false;
+  const kernels::Texture& texture = scene.textures[index];
+  const bool repeats =
+      texture.wrap_s == kernels::Wrap::repeat || texture.wrap_t == kernels::Wrap::repeat;
+  return repeats && texture.wrap_s != texture.wrap_t && texture.filter == kernels::Filter::linear;
+}
+
 }  // namespace
 
 util::Result<ReferenceLimits> blender_limits(const SceneRequest& request,
@@ -61,6 +72,13 @@ util::Result<ReferenceLimits> blender_limits(const SceneRequest& request,
   if (cut_by_colors) {
     limits.shown_otherwise.emplace_back(
         "Blender's importer keeps vertex colours in 8 bits, and here their alpha cuts out (MASK)");
+  }
+  const auto seams = [&](const kernels::Material& m) { return filters_across_a_seam(scene, m); };
+  if (std::any_of(scene.materials.begin(), scene.materials.end(), seams)) {
+    limits.shown_otherwise.emplace_back(
+        "Blender's importer does not filter across the seams of a texture that wraps differently "
+        "in "
+        "its two directions, and here its alpha cuts out (MASK)");
   }
   if (request.source.starts_with("builtin:")) return limits;
 

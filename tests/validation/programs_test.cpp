@@ -249,7 +249,7 @@ TEST_F(RealPrograms, ABugIsAnExitCode) {
                    cull, "--size", "320x240"})
                   .code,
               0);
-    const Outcome outcome = run({"compare", "ours.exr", "pov/" + stem + "_povray.png"});
+    const Outcome outcome = run({"compare", "ours.exr", "pov/" + side["image"].get<std::string>()});
     EXPECT_EQ(outcome.code, code) << outcome.text;
   }
 }
