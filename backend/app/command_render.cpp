@@ -7,6 +7,7 @@
 #include "backend/app/command.h"
 #include "backend/app/options.h"
 #include "backend/app/output.h"
+#include "backend/app/preload.h"
 #include "backend/app/progress.h"
 #include "backend/app/render_stats.h"
 #include "backend/image/image.h"
@@ -233,7 +234,7 @@ util::Result<util::Exit> run_render(RenderOptions options) {
   RenderStats stats;
   util::Result<Plan> plan = make_plan(options);
   if (!plan) return plan.error();
-  image::preload();
+  preload_libraries();
   Progress progress(options.progress);
 
   progress.stage("load");
