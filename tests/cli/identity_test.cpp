@@ -12,8 +12,11 @@ TEST(Identity, ThreadsTilesAndBuildersChangeNoBit) {
   Scratch scratch;
   const auto render = [&](const std::vector<std::string>& more) {
     std::vector<std::string> arguments = {
-        "render", "builtin:default",     "--size", "72x50", "--spp", "4", "--aov", "all",
+        "render", "builtin:default",     "--size", "48x32", "--aov", "all",
         "-o",     scratch.path("a.exr"), "--quiet"};
+    if (std::find(more.begin(), more.end(), "--spp") == more.end()) {
+      arguments.insert(arguments.end(), {"--spp", "2"});
+    }
     arguments.insert(arguments.end(), more.begin(), more.end());
     const Outcome outcome = run(arguments);
     EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
