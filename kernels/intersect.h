@@ -27,7 +27,7 @@ struct ClosestLeaf {
   Hit hit;
 
   OCTRACE_HD OCTRACE_FORCE_INLINE bool operator()(std::uint32_t index, float& tmax) {
-    const LeafTriangle& triangle = scene.octree.triangles[index];
+    const LeafTriangle triangle = load(scene.octree.triangles[index]);
     TriangleHit found;
     if (!intersect_triangle(slab_ray, triangle_ray, triangle.a, triangle.b, triangle.c, tmin, tmax,
                             culls_back(triangle, params), &found)) {
@@ -59,7 +59,7 @@ struct TransmittanceLeaf {
   static constexpr std::uint32_t kBlocked = 24u << 16;  // 2^-24 is dark enough
 
   OCTRACE_HD OCTRACE_FORCE_INLINE bool operator()(std::uint32_t index, float& tmax) {
-    const LeafTriangle& triangle = scene.octree.triangles[index];
+    const LeafTriangle triangle = load(scene.octree.triangles[index]);
     TriangleHit found;
     if (!intersect_triangle(slab_ray, triangle_ray, triangle.a, triangle.b, triangle.c, tmin, tmax,
                             false, &found)) {

@@ -40,6 +40,14 @@ using ChildHits = std::uint32_t;
 inline constexpr ChildHits kInnerBits = 0xff000000u;
 inline constexpr ChildHits kTriangleBits = 0x00ffffffu;
 
+// What a child test reads of a node beside its boxes, so that the node is loaded once.
+struct NodeVisit {
+  ChildHits hits;
+  std::uint32_t inner_mask;
+  std::uint32_t first_child;
+  std::uint32_t first_triangle;
+};
+
 OCTRACE_HD OCTRACE_FORCE_INLINE ChildHits child_bits(const Node& node, int slot,
                                                      std::uint32_t octant) {
   const std::uint32_t meta = node.meta[slot];
@@ -47,9 +55,10 @@ OCTRACE_HD OCTRACE_FORCE_INLINE ChildHits child_bits(const Node& node, int slot,
   return inner ? 1u << (24 + (slot ^ octant ^ 7u)) : (meta >> 5) << (meta & 31u);
 }
 
-// The 8-child box test in portable code; kernels/cpu has a SIMD one.
+// The 8-child box test in plain words; kernels/cpu has a SIMD body of it and kernels/cuda a SIMT
+// one.
 struct ScalarChildTest {
-  OCTRACE_HD OCTRACE_FORCE_INLINE ChildHits operator()(const Node& node, const SlabRay& ray,
+  OCTRACE_HD OCTRACE_FORCE_INLINE NodeVisit operator()(const Node& node, const SlabRay& ray,
                                                        float tmin, float tmax) const {
     const NodeFrame frame = node_frame(node, ray);
     ChildHits hits = 0;
@@ -60,12 +69,12 @@ struct ScalarChildTest {
         const float lower = static_cast<float>(node.lower[axis][slot]);
         const float upper = static_cast<float>(node.upper[axis][slot]);
         const float step = frame.step[axis];
-        near = greater(near, (negative ? upper : lower) * step + frame.near[axis]);
-        far = lesser(far, (negative ? lower : upper) * step + frame.far[axis]);
+        near = greater(near, fma_rn(negative ? upper : lower, step, frame.near[axis]));
+        far = lesser(far, fma_rn(negative ? lower : upper, step, frame.far[axis]));
       }
       if (near <= far) hits |= child_bits(node, slot, ray.octant);
     }
-    return hits;
+    return {hits, node.inner_mask, node.first_child, node.first_triangle};
   }
 };
 
@@ -130,10 +139,10 @@ struct Walk {
     const std::uint32_t slot = (static_cast<std::uint32_t>(bit) - 24u) ^ ray.octant ^ 7u;
     const std::uint32_t before = group.pending & 0xffu & ((1u << slot) - 1u);
     const Node& node = octree.nodes[group.first_child + count_bits(before)];
-    const ChildHits hits = child_test(node, ray, tmin, tmax);
-    group = {node.first_child, (hits & kInnerBits) | node.inner_mask};
-    first_triangle = node.first_triangle;
-    triangles = hits & kTriangleBits;
+    const NodeVisit visit = child_test(node, ray, tmin, tmax);
+    group = {visit.first_child, (visit.hits & kInnerBits) | visit.inner_mask};
+    first_triangle = visit.first_triangle;
+    triangles = visit.hits & kTriangleBits;
     return true;
   }
 

@@ -37,9 +37,15 @@ util::Result<void> write_stats(const std::string& path, const RenderStats& stats
                   {"shadow", stats.trace.shadow_rays},
                   {"total", stats.rays()}};
   json["mrays_per_s"] = stats.mrays_per_s();
-  json["ms"] = {{"load", session.load_ms},     {"build", session.build_ms},
-                {"verify", session.verify_ms}, {"trace", stats.trace_ms},
-                {"write", stats.write_ms},     {"total", stats.total.milliseconds()}};
+  json["ms"] = {{"load", session.load_ms},
+                {"build", session.build_ms},
+                {"verify", session.verify_ms},
+                {"trace", stats.trace_ms},
+                {"upload", 1e3 * stats.trace.upload_seconds},
+                {"kernel", 1e3 * stats.trace.kernel_seconds},
+                {"download", 1e3 * stats.trace.download_seconds},
+                {"write", stats.write_ms},
+                {"total", stats.total.milliseconds()}};
   json["octree"] = octree_json(octree::statistics(session.octree));
   json["octree"]["builder"] = stats.builder == octree::Builder::sah ? "sah" : "median";
   json["peak_rss_bytes"] = util::peak_resident_bytes();

@@ -79,6 +79,9 @@ util::Result<std::unique_ptr<CudaRenderer>> CudaRenderer::create(const scene::Sc
   }
   for (Band& band : renderer->bands_) {
     if (status.ok()) status = band.stream.create();
+    for (DeviceEvent* event : {&band.begun, &band.traced, &band.copied}) {
+      if (status.ok()) status = event->create();
+    }
     if (status.ok()) status = band.report.reserve(sizeof(Report));
     if (status.ok()) status = band.host_report.reserve(sizeof(Report));
   }
@@ -129,12 +132,15 @@ Status CudaRenderer::start(Band& band, const kernels::cuda::View& whole,
   auto* report = static_cast<Report*>(band.report.data());
   const kernels::cuda::Stream stream = band.stream.get();
   Status s = kernels::cuda::clear(report, sizeof(Report), stream);
+  if (s.ok()) s = kernels::cuda::record_event(band.begun.get(), stream);
   if (s.ok()) s = kernels::cuda::launch_view(view, report, stream);
+  if (s.ok()) s = kernels::cuda::record_event(band.traced.get(), stream);
   const std::uint64_t bytes = bytes_a_row(framebuffer) * band.rows;
   if (s.ok()) s = kernels::cuda::copy_to_host(band.host_planes.data(), planes, bytes, stream);
   if (s.ok()) {
     s = kernels::cuda::copy_to_host(band.host_report.data(), report, sizeof(Report), stream);
   }
+  if (s.ok()) s = kernels::cuda::record_event(band.copied.get(), stream);
   return s;
 }
 
@@ -143,6 +149,12 @@ util::Result<void> CudaRenderer::finish(Band& band, Framebuffer& framebuffer, Tr
   if (Status s = kernels::cuda::synchronize(band.stream.get()); !s.ok()) return cuda_error(s);
   const Report& report = *static_cast<const Report*>(band.host_report.data());
   if (report.status != 0) return trace_error(report);
+  float trace_ms = 0.0f, copy_ms = 0.0f;
+  Status timed = kernels::cuda::elapsed(band.begun.get(), band.traced.get(), &trace_ms);
+  if (timed.ok()) timed = kernels::cuda::elapsed(band.traced.get(), band.copied.get(), &copy_ms);
+  if (!timed.ok()) return cuda_error(timed);
+  stats.kernel_seconds += trace_ms * 1e-3;
+  stats.download_seconds += copy_ms * 1e-3;
   stats.beauty_rays += report.beauty_rays;
   stats.shadow_rays += report.shadow_rays;
   const kernels::FramebufferView to = framebuffer.view();

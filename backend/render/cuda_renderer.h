@@ -25,6 +25,7 @@ class CudaRenderer final : public Renderer {
     DeviceStream stream;
     DeviceMemory planes, report;
     PinnedMemory host_planes, host_report;
+    DeviceEvent begun, traced, copied;
     std::uint32_t first_row = 0, rows = 0;  // rows 0: idle
   };
 

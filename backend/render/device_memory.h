@@ -1,4 +1,4 @@
-// Device and pinned host memory that frees itself, and a stream that does.
+// Device and pinned host memory that frees itself, and streams and events that do.
 #pragma once
 
 #include <cstdint>
@@ -60,6 +60,21 @@ class DeviceStream {
 
  private:
   kernels::cuda::Stream stream_ = nullptr;
+};
+
+class DeviceEvent {
+ public:
+  DeviceEvent() = default;
+  DeviceEvent(const DeviceEvent&) = delete;
+  DeviceEvent& operator=(const DeviceEvent&) = delete;
+  ~DeviceEvent() {
+    if (event_ != nullptr) kernels::cuda::destroy_event(event_);
+  }
+  kernels::cuda::Status create() { return kernels::cuda::create_event(&event_); }
+  kernels::cuda::Event get() const { return event_; }
+
+ private:
+  kernels::cuda::Event event_ = nullptr;
 };
 
 }  // namespace octrace::render

@@ -28,8 +28,10 @@ struct TraceStats {
   std::uint64_t beauty_rays = 0;  // camera, transparency and sky rays of beauty
   std::uint64_t shadow_rays = 0;
   double seconds = 0.0;
+  // On a GPU, by its own clock; copies overlap kernels, so the two may add up to more than seconds.
+  double kernel_seconds = 0.0, download_seconds = 0.0;
   double upload_seconds = 0.0;  // of the scene to the device, once a scene; 0 on the CPU
-  std::string device;  // "cpu: AMD EPYC 9654, 2 threads, AVX2"
+  std::string device;           // "cpu: AMD EPYC 9654, 2 threads, AVX2"
 };
 
 class Renderer {

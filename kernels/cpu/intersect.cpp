@@ -31,7 +31,7 @@ inline constexpr VisitOrder kVisitOrder;
 struct SimdChildTest {
   // Not forced inline: the compiler refuses to force it into the portable traverse(), but inlines
   // it once traverse() itself has been inlined into a function of this target.
-  HWY_ATTR inline ChildHits operator()(const Node& node, const SlabRay& ray, float tmin,
+  HWY_ATTR inline NodeVisit operator()(const Node& node, const SlabRay& ray, float tmin,
                                        float tmax) const {
     const hn::CappedTag<float, kChildren> d;
     const hn::RebindToSigned<decltype(d)> di;
@@ -62,7 +62,7 @@ struct SimdChildTest {
       const std::uint32_t meta = node.meta[lowest_bit(leaves)];
       hits |= (meta >> 5) << (meta & 31u);
     }
-    return hits;
+    return {hits, node.inner_mask, node.first_child, node.first_triangle};
   }
 
  private:

@@ -61,8 +61,8 @@ Status elapsed(Event start, Event stop, float* milliseconds);  // waits for stop
 struct Report {
   unsigned long long beauty_rays, shadow_rays;
   unsigned long long next_ray;  // of launch_rays: the first ray that no warp has taken yet
-  std::uint32_t status;  // TraceStatus of a pixel that failed; 0: none
-  std::uint32_t x, y;    // that pixel
+  std::uint32_t status;         // TraceStatus of a pixel that failed; 0: none
+  std::uint32_t x, y;           // that pixel
 };
 
 // All pointers in scene, target and report are device memory. target.height rows are traced, from

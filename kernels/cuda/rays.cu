@@ -84,7 +84,7 @@ __global__ void __launch_bounds__(kBlock)
     const int refill_below = more ? kRefillBelow : 1;
     do {
       if (live) {
-        live = lane.walk.next_node(scene.octree, ScalarChildTest{}, stack);
+        live = lane.walk.next_node(scene.octree, SimtChildTest{}, stack);
         while (live && lane.walk.triangles != 0) {
           if (lane.test(scene, params)) live = false;
         }

@@ -1,6 +1,7 @@
 // Ray queries inlined into a kernel: the Tracer of kernels/pixel.h on CUDA.
 #pragma once
 
+#include "kernels/cuda/child_test.h"
 #include "kernels/cuda/cuda.h"
 #include "kernels/intersect.h"
 
@@ -9,11 +10,11 @@ namespace octrace::kernels::cuda {
 struct Tracer {
   __device__ TraceStatus closest(const SceneView& scene, const RenderParams& params, const Ray& ray,
                                  Hit* hit) const {
-    return closest_hit(scene, params, ray, ScalarChildTest{}, hit);
+    return closest_hit(scene, params, ray, SimtChildTest{}, hit);
   }
   __device__ TraceStatus transmittance(const SceneView& scene, const RenderParams& params,
                                        const Ray& ray, float* transmittance) const {
-    return shadow_transmittance(scene, params, ray, ScalarChildTest{}, transmittance);
+    return shadow_transmittance(scene, params, ray, SimtChildTest{}, transmittance);
   }
 };
 

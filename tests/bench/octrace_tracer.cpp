@@ -15,12 +15,13 @@ namespace {
 struct CountingChildTest {
   std::uint64_t* nodes;
   std::uint64_t* triangles;
-  kernels::ChildHits operator()(const kernels::Node& node, const kernels::SlabRay& ray, float tmin,
+  kernels::NodeVisit operator()(const kernels::Node& node, const kernels::SlabRay& ray, float tmin,
                                 float tmax) const {
-    const kernels::ChildHits hits = kernels::ScalarChildTest{}(node, ray, tmin, tmax);
+    const kernels::NodeVisit visit = kernels::ScalarChildTest{}(node, ray, tmin, tmax);
     ++*nodes;
-    *triangles += static_cast<std::uint64_t>(kernels::count_bits(hits & kernels::kTriangleBits));
-    return hits;
+    *triangles +=
+        static_cast<std::uint64_t>(kernels::count_bits(visit.hits & kernels::kTriangleBits));
+    return visit;
   }
 };
 
