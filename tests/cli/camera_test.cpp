@@ -69,6 +69,41 @@ TEST(Camera, OrthographicAndPinholeFilesLookWhereTheySay) {
   }
 }
 
+// A triangle seen from behind, by a turned camera.
+TEST(Cull, BackFacesFollowTheMaterialOrTheOption) {
+  Scratch scratch;
+  const std::string both = read_text(OCTRACE_TEST_DATA "/triangle.gltf");
+  std::string one = both;
+  one.replace(one.find("\"doubleSided\": true"), 19, "\"doubleSided\": false");
+  write_text(scratch.path("both.gltf"), both);
+  write_text(scratch.path("one.gltf"), one);
+  write_text(scratch.path("behind.json"),
+             "{\"type\":\"perspective\",\"yfov\":0.7,"
+             "\"matrix\":[-1,0,0,0, 0,1,0,0, 0,0,-1,0, 0.4,0.4,-2.5,1]}");
+  const auto hits = [&](const std::string& file, const std::vector<std::string>& more) {
+    std::vector<std::string> arguments = {"render",
+                                          scratch.path(file),
+                                          "--size",
+                                          "64x64",
+                                          "-o",
+                                          scratch.path("a.exr:mask"),
+                                          "--quiet",
+                                          "--camera",
+                                          scratch.path("behind.json")};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    const Outcome outcome = run(arguments);
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+    const util::Result<image::Image> image = image::read(scratch.path("a.exr"), {});
+    double sum = 0.0;
+    for (const float value : image->find("mask")->floats) sum += value;
+    return sum;
+  };
+  const double whole = hits("both.gltf", {});
+  EXPECT_GT(whole, 300.0);
+  EXPECT_EQ(hits("one.gltf", {}), 0.0);
+  EXPECT_EQ(hits("one.gltf", {"--cull", "none"}), whole);
+}
+
 TEST(Camera, BrokenFilesAreRefused) {
   Scratch scratch;
   for (const char* text : {"", "{", "[]", "{\"type\":\"fisheye\"}", "{\"type\":\"perspective\"}"}) {
