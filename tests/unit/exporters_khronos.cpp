@@ -23,7 +23,8 @@ std::string validator_folder() {
   if (!installed("node") || !installed("npm")) return "";
   std::filesystem::create_directories(folder);
   const int code = run_in(folder.string(), "npm",
-                          {"install", "--no-audit", "--no-fund", "--prefix", ".", kPackage});
+                          {"install", "--no-audit", "--no-fund", "--fetch-retries=1",
+                           "--fetch-timeout=20000", "--prefix", ".", kPackage});
   return code == 0 ? folder.string() : "";
 }
 
