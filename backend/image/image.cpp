@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cstring>
 #include <filesystem>
 #include <thread>
@@ -64,6 +65,8 @@ Loaded load() {
   return {nullptr, load_error(fmt::format("{} was not found beside the program", kModuleFile))};
 }
 
+std::atomic<bool> preload_begun{false};
+
 const Loaded& module() {
   static const Loaded loaded = load();
   return loaded;
@@ -91,7 +94,12 @@ const Image::Plane* Image::find(const std::string& name) const {
 }
 
 void preload() {
+  preload_begun = true;
   std::thread([] { module(); }).detach();
+}
+
+void finish_preload() {
+  if (preload_begun) module();
 }
 
 util::Result<void> set_threads(unsigned threads) {

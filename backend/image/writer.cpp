@@ -27,14 +27,15 @@ util::Error write_error(const std::string& path, const FileProxy& file, const st
 
 util::Result<void> write_file(const std::string& path, const OIIO::ImageSpec& spec,
                               const FillRows& fill) {
+  // Before the output, whose destructor may write through it.
+  FileProxy file(path);
+  if (file.error_number() != 0) return write_error(path, file, "");
   std::unique_ptr<OIIO::ImageOutput> output = OIIO::ImageOutput::create(path);
   if (!output) {
     return util::Error{util::Exit::unsupported, "IMAGE_FORMAT",
                        fmt::format("no writer for this kind of file: {}", OIIO::geterror()), path,
                        ""};
   }
-  FileProxy file(path);
-  if (file.error_number() != 0) return write_error(path, file, "");
   output->set_ioproxy(&file);
   if (!output->open(path, spec)) return write_error(path, file, output->geterror());
 
