@@ -38,6 +38,7 @@ struct ValidateRequest {
   std::vector<std::string> sources;
   std::vector<std::string> against{"povray", "blender"};
   std::string size = "640x480", report, povray = "povray", blender = "blender";
+  std::string device = "auto";
   std::vector<std::string> tolerances;
   int timeout = 120;
   SceneRequest scene;
@@ -209,6 +210,9 @@ Result<void> run_scenes(State& run) {
 Result<void> prepare(ValidateRequest& request, State& run) {
   auto size = parse_size(request.size, request.scene.limits);
   if (!size) return size.error();
+  util::Result<render::DeviceChoice> device = render::parse_device(request.device);
+  if (!device) return device.error();
+  request.views.device = *device;
   request.views.size = request.references.size = *size;
   request.references.cull = request.views.cull;
   request.references.alpha = request.views.alpha;
@@ -318,6 +322,10 @@ void declare_options(CLI::App& command, ValidateRequest& request) {
           "change a limit for this run; may be repeated (octrace compare --help lists them)")
       ->allow_extra_args(false)
       ->type_name("NAME=VALUE");
+  command
+      .add_option("--device", request.device,
+                  "where octrace traces: auto, cpu, cuda or cuda:N [auto]")
+      ->type_name("DEVICE");
   command
       .add_option("--cull", request.views.cull,
                   "back faces: spec culls them as doubleSided says [spec]")

@@ -83,7 +83,8 @@ util::Result<validation::Planes> render_planes(const scene::Scene& scene,
   settings.params.alpha = options.alpha;
   settings.threads = options.threads;
   settings.cancel = &util::interrupt_flag();
-  const std::unique_ptr<render::Renderer> renderer = render::make_cpu_renderer(scene, octree);
+  const std::unique_ptr<render::Renderer> renderer =
+      render::make_renderer(scene, octree, options.device);
   const auto traced =
       renderer->render(scene::make_ray_camera(camera, static_cast<int>(options.size.width),
                                               static_cast<int>(options.size.height)),

@@ -6,6 +6,7 @@
 
 #include "backend/app/options.h"
 #include "backend/octree/octree.h"
+#include "backend/render/device.h"
 #include "backend/scene/scene.h"
 #include "validation/compare/planes.h"
 
@@ -21,6 +22,7 @@ struct ViewOptions {
   ImageSize size{640, 480};
   bool cull = true, alpha = true;
   unsigned threads = 0;
+  render::DeviceChoice device;
 };
 
 // The mask, depth and object ids that octrace sees through a camera.

@@ -110,7 +110,11 @@ HWY_ATTR TraceStatus transmittance(const SceneView& scene, const RenderParams& p
   return shadow_transmittance(scene, params, ray, SimdChildTest{}, transmittance);
 }
 
-HWY_ATTR const char* instruction_set() { return hwy::TargetName(HWY_TARGET); }
+// Highway counts AVX-512 as the third AVX.
+HWY_ATTR const char* instruction_set() {
+  return HWY_TARGET == HWY_AVX3 || HWY_TARGET == HWY_AVX3_DL ? "AVX-512"
+                                                             : hwy::TargetName(HWY_TARGET);
+}
 
 }  // namespace octrace::kernels::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();

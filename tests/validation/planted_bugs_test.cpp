@@ -25,11 +25,11 @@ constexpr std::uint32_t kWidth = 640, kHeight = 480;
 // loader's bug is Blender's to find.
 struct Bug {
   const char* name;
-  std::function<void(json&)> file;             // what the loader makes of the file
-  std::function<void(scene::Scene&)> scene;    // what the loader makes of its arrays
-  std::function<void(scene::Camera&)> camera;  // where the rays go
-  std::function<void(app::ViewOptions&)> view;
-  std::function<void(Planes&)> image;
+  std::function<void(json&)> file = {};             // what the loader makes of the file
+  std::function<void(scene::Scene&)> scene = {};    // what the loader makes of its arrays
+  std::function<void(scene::Camera&)> camera = {};  // where the rays go
+  std::function<void(app::ViewOptions&)> view = {};
+  std::function<void(Planes&)> image = {};
   bool loader() const { return file || scene; }
 };
 

@@ -61,7 +61,8 @@ std::string histogram_svg(const GeometryMetrics& metrics, const std::vector<Chec
     if (check.name == "depth-median") svg += limit_line(check, "median", 10);
     if (check.name == "depth-p99") svg += limit_line(check, "p99", 21);
   }
-  return svg + "</svg>";
+  svg += "</svg>";
+  return svg;
 }
 
 }  // namespace octrace::validation
