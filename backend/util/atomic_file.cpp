@@ -42,13 +42,18 @@ mode_t process_umask() {
 }  // namespace
 
 Result<AtomicFile> AtomicFile::create(const std::string& target) {
-  const std::filesystem::path path(target);
-  if (path.filename().empty()) {
+  std::filesystem::path path(target);
+  std::error_code ignored;
+  if (path.filename().empty() || std::filesystem::is_directory(path, ignored)) {
     return Error{Exit::io, "IO_ERROR", "is a folder, a file name was needed", target, ""};
   }
-  std::error_code ignored;
-  if (std::filesystem::is_directory(path, ignored)) {
-    return Error{Exit::io, "IO_ERROR", "is a folder, a file name was needed", target, ""};
+  // A rename would put a file in the place of /dev/null, and break a link instead of following it.
+  if (std::filesystem::exists(path, ignored)) {
+    if (!std::filesystem::is_regular_file(path, ignored)) {
+      return Error{Exit::io, "IO_ERROR", "is a device or the like, a file was needed", target, ""};
+    }
+    if (std::filesystem::is_symlink(path, ignored))
+      path = std::filesystem::canonical(path, ignored);
   }
   // The leading dot hides it from patterns such as *.exr; mkstemps fills in the Xs.
   const std::string extension = path.extension().string();
@@ -58,7 +63,7 @@ Result<AtomicFile> AtomicFile::create(const std::string& target) {
   if (descriptor < 0) return io_error(target, "cannot be created", errno);
   ::fchmod(descriptor, 0666 & ~process_umask());  // mkstemps makes 0600
   ::close(descriptor);
-  return AtomicFile(target, std::move(temporary));
+  return AtomicFile(path.string(), std::move(temporary));
 }
 
 AtomicFile::AtomicFile(AtomicFile&& other) noexcept

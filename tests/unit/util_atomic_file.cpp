@@ -65,6 +65,23 @@ TEST_F(AtomicFileTest, ReplacesAndRespectsTheUmask) {
   EXPECT_EQ(count(), 1u);
 }
 
+TEST_F(AtomicFileTest, FollowsLinks) {
+  fs::create_directories(folder_ / "elsewhere");
+  ASSERT_TRUE(util::write_file(path("elsewhere/real.json"), "old"));
+  fs::create_symlink("elsewhere/real.json", path("link.json"));
+  ASSERT_TRUE(util::write_file(path("link.json"), "new"));
+  EXPECT_TRUE(fs::is_symlink(path("link.json")));
+  EXPECT_EQ(text(path("elsewhere/real.json")), "new");
+}
+
+TEST_F(AtomicFileTest, LeavesWhatIsNoFileAlone) {
+  ASSERT_EQ(::mkfifo(path("pipe.json").c_str(), 0600), 0);
+  const util::Result<void> written = util::write_file(path("pipe.json"), "content");
+  ASSERT_FALSE(written);
+  EXPECT_EQ(written.error().exit, util::Exit::io);
+  EXPECT_TRUE(fs::is_fifo(path("pipe.json")));
+}
+
 TEST_F(AtomicFileTest, FoldersAndMissingFoldersAreErrors) {
   for (const std::string& target :
        {folder_.string(), folder_.string() + "/", path("missing/a.exr"), std::string()}) {
