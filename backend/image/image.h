@@ -54,7 +54,8 @@ enum class Encoding {
 };
 
 void preload();  // starts loading the image library in the background; optional
-// Returns when a preload() that was begun has ended: a process must not run its exit handlers before.
+// Returns when a preload() that was begun has ended: a process must not run its exit handlers
+// before.
 void finish_preload();
 // The library's own threads, which compress and decompress (0: all cores). Waits for its loading.
 util::Result<void> set_threads(unsigned threads);
