@@ -1,7 +1,9 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <filesystem>
 #include <memory>
+#include <set>
 
 #include "backend/app/camera_choice.h"
 #include "backend/app/command.h"
@@ -68,6 +70,9 @@ void declare_view(CLI::App& command, RenderOptions& options) {
   command
       .add_option("--camera", options.camera,
                   "which camera [the scene's first, else one that frames the bounds]")
+      ->check([](const std::string& name) {  // an unset variable of a shell
+        return name.empty() ? std::string("a name, an index or a file is needed") : std::string();
+      })
       ->type_name("NAME|INDEX|FILE.json");
   command.add_option("--size", options.size, "pixels [1280x720]")->type_name("WxH");
   command.add_option("--spp", options.params.spp, "samples a pixel, for beauty only [16]")
@@ -89,7 +94,7 @@ void declare_view(CLI::App& command, RenderOptions& options) {
   command
       .add_option("--depth-scale", options.depth_scale,
                   "units a metre of 16-bit depth; 1000: millimetres, up to 65.534 m [1000]")
-      ->check(CLI::PositiveNumber.description(""))
+      ->check(CLI::Range(1e-6, 1e9).description(""))
       ->type_name("S");
 }
 
@@ -143,6 +148,25 @@ struct Plan {
   std::optional<scene::Camera> camera_file;
 };
 
+// No file of this command may replace another one, nor the scene itself.
+util::Result<void> check_apart(const RenderOptions& options, const std::vector<Output>& outputs) {
+  std::error_code ignored;
+  const auto resolved = [&](const std::string& path) {
+    return std::filesystem::weakly_canonical(std::filesystem::absolute(path, ignored), ignored);
+  };
+  std::set<std::filesystem::path> taken = {resolved(options.scene.source)};
+  if (!options.camera.empty()) taken.insert(resolved(options.camera));
+  std::vector<std::string> written;
+  for (const Output& output : outputs) written.push_back(output.path);
+  if (!options.stats.empty()) written.push_back(options.stats);
+  for (const std::string& path : written) {
+    if (!taken.insert(resolved(path)).second) {
+      return usage_error(fmt::format("{}: would replace another file of this command", path));
+    }
+  }
+  return {};
+}
+
 util::Result<Plan> make_plan(RenderOptions& options) {
   Plan plan;
   const util::Limits& limits = options.scene.limits;
@@ -178,6 +202,7 @@ util::Result<Plan> make_plan(RenderOptions& options) {
     util::Result<void> writable = check_writable(output.path);
     if (!writable) return writable.error();
   }
+  if (util::Result<void> apart = check_apart(options, plan.outputs); !apart) return apart.error();
   if (!options.stats.empty()) {
     util::Result<void> writable = check_writable(options.stats);
     if (!writable) return writable.error();

@@ -25,7 +25,7 @@ constexpr const char* kExamples = R"(Examples:
 "octrace COMMAND --help" explains a command's options.
 
 Exit codes: 0 done, 1 compared and different, 2 wrong command line, 3 invalid input, 4 a feature or
-device that octrace or this machine does not have, 5 reading or writing failed, 6 a limit or memory,
+program that octrace or this machine does not have, 5 reading or writing failed, 6 a limit or memory,
 7 a bug in octrace, 8 some jobs of a batch failed, 128 + N ended by signal N.)";
 
 int fail(const util::Error& error) {

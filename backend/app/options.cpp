@@ -46,7 +46,7 @@ void add_scene_options(CLI::App& command, SceneRequest& request) {
       ->required()
       ->type_name("");
   command.add_option("--scene", request.scene, "index of the glTF scene [the file's default]")
-      ->check(CLI::NonNegativeNumber.description(""))
+      ->check(CLI::Range(0, 1 << 24).description(""))
       ->type_name("N");
   add_choice<bool>(
       command, "--missing-images", request.missing_images_warn, {{"error", false}, {"warn", true}},

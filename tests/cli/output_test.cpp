@@ -35,6 +35,25 @@ std::vector<std::string> names(const image::Image& image) {
   return out;
 }
 
+TEST(Output, NoFileReplacesAnotherOfTheSameCommand) {
+  Scratch scratch;
+  const std::string same = scratch.path("a.png");
+  for (const std::vector<std::string>& more :
+       {std::vector<std::string>{"-o", "a.png", "--stats", "./a.png"},
+        std::vector<std::string>{"-o", "a.png", "-o", same}}) {
+    const Outcome outcome = render(scratch, more);
+    EXPECT_EQ(outcome.exit_code, 2);
+    EXPECT_FALSE(std::filesystem::exists(same));
+  }
+  std::filesystem::copy_file(std::string(OCTRACE_SOURCE) + "/tests/data/triangle.gltf", same);
+  Launch launch;
+  launch.folder = scratch.folder();
+  launch.arguments = {"render", "a.png", "-o", "./a.png", "--size", "8x8"};
+  const Outcome outcome = run(launch);
+  EXPECT_EQ(outcome.exit_code, 2);
+  EXPECT_THAT(outcome.err, HasSubstr("would replace"));
+}
+
 TEST(Output, OneExrHoldsEveryPlane) {
   Scratch scratch;
   const Outcome outcome = render(scratch, {"-o", "a.exr", "--aov", "all"});
