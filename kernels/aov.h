@@ -27,7 +27,8 @@ inline constexpr int kAovCount = 13;
 struct FramebufferView {
   void* planes[kAovCount] = {};
   std::uint32_t width = 0, height = 0;
-  std::uint32_t first_row = 0;  // of the image, that row 0 of the planes is: bands of a larger image
+  std::uint32_t first_row =
+      0;  // of the image, that row 0 of the planes is: bands of a larger image
 
   OCTRACE_HD std::uint64_t pixel(std::uint32_t x, std::uint32_t y) const {
     return static_cast<std::uint64_t>(y - first_row) * width + x;

@@ -109,8 +109,7 @@ OCTRACE_HD TraceStatus trace_beauty(const SceneView& scene, const RayCamera& cam
     if (status != TraceStatus::ok) return status;
     sum += color;
   }
-  store(to.floats(Aov::beauty), to.pixel(x, y),
-        sum / static_cast<float>(params.spp));
+  store(to.floats(Aov::beauty), to.pixel(x, y), sum / static_cast<float>(params.spp));
   return TraceStatus::ok;
 }
 

@@ -1,5 +1,5 @@
-// The flat records that a scene is made of, the same in host and device memory. World space, metres,
-// right-handed, +Y up. Counter-clockwise corners face the viewer.
+// The flat records that a scene is made of, the same in host and device memory. World space,
+// metres, right-handed, +Y up. Counter-clockwise corners face the viewer.
 #pragma once
 
 #include "kernels/config.h"
@@ -12,8 +12,9 @@ struct Triangle {
   std::uint32_t a, b, c;
 };
 
-// One glTF primitive of one node: a run of triangles and a run of vertices. The attribute fields are
-// the index of the first vertex's entry in the flat attribute array, or kNone where it has none.
+// One glTF primitive of one node: a run of triangles and a run of vertices. The attribute fields
+// are the index of the first vertex's entry in the flat attribute array, or kNone where it has
+// none.
 struct Geometry {
   std::uint32_t first_triangle, triangle_count;
   std::uint32_t first_vertex, vertex_count;
@@ -71,9 +72,9 @@ enum class LightType : std::uint32_t { directional, point, spot };
 struct Light {
   LightType type;
   Vec3 position;
-  Vec3 direction;  // unit, the way the light shines (directional, spot)
-  Vec3 intensity;  // colour times intensity, linear
-  float range;     // metres; +infinity: none
+  Vec3 direction;                 // unit, the way the light shines (directional, spot)
+  Vec3 intensity;                 // colour times intensity, linear
+  float range;                    // metres; +infinity: none
   float spot_scale, spot_offset;  // attenuation = clamp(cos(angle) * scale + offset, 0, 1)^2
 };
 

@@ -20,7 +20,7 @@ struct SceneView {
   Span<Vec4> colors;    // linear
   Span<Material> materials;
   Span<Texture> textures;
-  Span<std::uint32_t> texels;         // R in the low byte
+  Span<std::uint32_t> texels;             // R in the low byte
   const float* srgb_to_linear = nullptr;  // 256 entries
   Span<Light> lights;
   float diagonal = 1.0f;  // of the bounds; scales ray offsets

@@ -1,5 +1,6 @@
-// Every triangle against every ray: the oracle that has no tree. It shares the triangle test with the
-// product on purpose (bits are compared); tests/golden/embree_test.cpp checks that test with Embree.
+// Every triangle against every ray: the oracle that has no tree. It shares the triangle test with
+// the product on purpose (bits are compared); tests/property/embree_scenes_test.cpp checks that
+// test with Embree.
 #pragma once
 
 #include <span>
