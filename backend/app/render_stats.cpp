@@ -58,10 +58,10 @@ std::string summary(const RenderStats& stats, const SceneSession& session) {
     names += (names.empty() ? "" : ", ") + output;
   }
   return fmt::format(
-      "{}: {} triangles, load {:.0f} ms, build {:.0f} ms, trace {:.0f} ms ({:.1f} Mrays/s), write "
-      "{:.0f} ms",
+      "{}: {} triangles, load {:.0f} ms, build {:.0f} ms, trace {:.0f} ms ({:.1f} Mrays/s) on {}, "
+      "write {:.0f} ms",
       names, session.scene.triangles.size(), session.load_ms, session.build_ms, stats.trace_ms,
-      stats.mrays_per_s(), stats.write_ms);
+      stats.mrays_per_s(), stats.trace.device, stats.write_ms);
 }
 
 }  // namespace octrace::app
