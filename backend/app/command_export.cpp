@@ -5,9 +5,9 @@
 #include <map>
 #include <memory>
 
-#include "backend/app/camera_choice.h"
 #include "backend/app/command.h"
 #include "backend/app/options.h"
+#include "backend/batch/camera_choice.h"
 #include "backend/scene/builtin.h"
 #include "backend/util/log.h"
 #include "exporters/blender/blender.h"
@@ -67,7 +67,7 @@ util::Result<std::vector<NamedCamera>> cameras_of(const ExportOptions& options,
     return cameras;
   }
   const auto camera =
-      choose_camera(options.camera == kAllCameras ? "" : options.camera, scene, aspect);
+      batch::choose_camera(options.camera == kAllCameras ? "" : options.camera, scene, aspect);
   if (!camera) return camera.error();
   cameras.push_back({*camera, stem});
   return cameras;

@@ -5,24 +5,26 @@
 #include <memory>
 #include <set>
 
-#include "backend/app/camera_choice.h"
 #include "backend/app/command.h"
 #include "backend/app/options.h"
-#include "backend/app/output.h"
 #include "backend/app/preload.h"
 #include "backend/app/progress.h"
 #include "backend/app/render_stats.h"
+#include "backend/batch/camera_choice.h"
+#include "backend/batch/output.h"
 #include "backend/image/image.h"
 #include "backend/render/device.h"
 #include "backend/render/renderer.h"
 #include "backend/util/interrupt.h"
 #include "backend/util/log.h"
 #include "backend/util/process.h"
-#include "backend/util/version.h"
 
 namespace octrace::app {
 
 namespace {
+
+using batch::Metadata;
+using batch::Output;
 
 struct RenderOptions {
   SceneRequest scene;
@@ -177,7 +179,7 @@ util::Result<Plan> make_plan(RenderOptions& options) {
       plan_outputs(options.outputs, options.aovs, plan.size);
   if (!outputs) return outputs.error();
   plan.outputs = std::move(*outputs);
-  plan.aovs = needed_aovs(plan.outputs);
+  plan.aovs = batch::needed_aovs(plan.outputs);
   if (options.params.spp == 0) return usage_error("--spp: at least 1 is needed");
   if (options.params.spp > limits.max_spp) {
     return util::Error{
@@ -199,29 +201,15 @@ util::Result<Plan> make_plan(RenderOptions& options) {
     plan.camera_file = std::move(*camera);
   }
   for (const Output& output : plan.outputs) {
-    util::Result<void> writable = check_writable(output.path);
+    util::Result<void> writable = batch::check_writable(output.path);
     if (!writable) return writable.error();
   }
   if (util::Result<void> apart = check_apart(options, plan.outputs); !apart) return apart.error();
   if (!options.stats.empty()) {
-    util::Result<void> writable = check_writable(options.stats);
+    util::Result<void> writable = batch::check_writable(options.stats);
     if (!writable) return writable.error();
   }
   return plan;
-}
-
-bool needs_textures(const render::AovSet& aovs) {
-  for (const kernels::Aov aov :
-       {kernels::Aov::beauty, kernels::Aov::albedo, kernels::Aov::normal}) {
-    if (aovs.test(static_cast<std::size_t>(aov))) return true;
-  }
-  return false;
-}
-
-Metadata make_metadata(const RenderOptions& options, const scene::Camera& camera) {
-  return {{"octrace:version", util::version()},
-          {"octrace:scene", options.scene.source},
-          {"octrace:camera", camera_json(camera)}};
 }
 
 util::Result<render::TraceStats> trace(const RenderOptions& options, const SceneSession& session,
@@ -263,14 +251,14 @@ util::Result<util::Exit> run_render(RenderOptions options) {
   Progress progress(options.progress);
 
   progress.stage("load");
-  options.scene.need_textures = needs_textures(plan->aovs);
+  options.scene.need_textures = batch::needs_textures(plan->aovs);
   util::Result<std::unique_ptr<SceneSession>> session = open_scene(options.scene);
   if (!session) return session.error();
   const double aspect =
       static_cast<double>(plan->size.width) / static_cast<double>(plan->size.height);
   util::Result<scene::Camera> camera =
       plan->camera_file ? util::Result<scene::Camera>(*plan->camera_file)
-                        : choose_camera(options.camera, (*session)->scene, aspect);
+                        : batch::choose_camera(options.camera, (*session)->scene, aspect);
   if (!camera) return camera.error();
 
   const util::InterruptGuard interruptible;
@@ -285,8 +273,8 @@ util::Result<util::Exit> run_render(RenderOptions options) {
 
   progress.stage("write");
   const util::Timer write_timer;
-  util::Result<void> written =
-      write_outputs(options, *plan, make_metadata(options, *camera), framebuffer, progress);
+  util::Result<void> written = write_outputs(
+      options, *plan, batch::view_metadata(options.scene.source, *camera), framebuffer, progress);
   if (!written) return written.error();
   stats.write_ms = write_timer.milliseconds();
   progress.finish();

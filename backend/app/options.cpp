@@ -33,10 +33,6 @@ void add_limit(CLI::App& command, const std::string& name, std::uint64_t& value,
 
 }  // namespace
 
-util::Error usage_error(const std::string& message) {
-  return {util::Exit::usage, "", message, "", ""};
-}
-
 void add_scene_options(CLI::App& command, SceneRequest& request) {
   command
       .add_option(

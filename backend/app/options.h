@@ -7,10 +7,16 @@
 #include <utility>
 #include <vector>
 
-#include "backend/app/scene_session.h"
+#include "backend/batch/output.h"
+#include "backend/batch/scene_session.h"
 #include "backend/util/limits.h"
 
 namespace octrace::app {
+
+using batch::ImageSize;
+using batch::SceneRequest;
+using batch::SceneSession;
+using batch::usage_error;
 
 // SCENE, --scene, --missing-images, --builder, --leaf, --threads, --verify, --max-...
 void add_scene_options(CLI::App& command, SceneRequest& request);
@@ -34,12 +40,7 @@ CLI::Option* add_choice(CLI::App& command, const std::string& name, T& value,
   return command.add_option_function<std::string>(name, choose, help)->type_name(words);
 }
 
-struct ImageSize {
-  std::uint32_t width = 1280, height = 720;
-};
 // "640x480". Usage errors; exit 6 past --max-image-pixels.
 util::Result<ImageSize> parse_size(const std::string& text, const util::Limits& limits);
-
-util::Error usage_error(const std::string& message);
 
 }  // namespace octrace::app

@@ -61,7 +61,7 @@ bool filters_across_a_seam(const scene::Scene& scene, const kernels::Material& m
 
 }  // namespace
 
-util::Result<ReferenceLimits> blender_limits(const SceneRequest& request,
+util::Result<ReferenceLimits> blender_limits(const batch::SceneRequest& request,
                                              const scene::Scene& scene) {
   ReferenceLimits limits;
   const bool cut_by_colors = std::any_of(

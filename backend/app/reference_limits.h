@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "backend/app/scene_session.h"
+#include "backend/batch/scene_session.h"
 #include "backend/util/result.h"
 
 namespace octrace::app {
@@ -17,7 +17,7 @@ struct ReferenceLimits {
 };
 
 // Errors: those of reading the file.
-util::Result<ReferenceLimits> blender_limits(const SceneRequest& request,
+util::Result<ReferenceLimits> blender_limits(const batch::SceneRequest& request,
                                              const scene::Scene& scene);
 
 }  // namespace octrace::app

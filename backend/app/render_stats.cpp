@@ -13,7 +13,7 @@ namespace octrace::app {
 using nlohmann::ordered_json;
 
 util::Result<void> write_stats(const std::string& path, const RenderStats& stats,
-                               const SceneSession& session) {
+                               const batch::SceneSession& session) {
   const scene::Scene& scene = session.scene;
   ordered_json json;
   json["octrace"] = util::version();
@@ -52,7 +52,7 @@ util::Result<void> write_stats(const std::string& path, const RenderStats& stats
   return util::write_file(path, json.dump(2) + "\n");
 }
 
-std::string summary(const RenderStats& stats, const SceneSession& session) {
+std::string summary(const RenderStats& stats, const batch::SceneSession& session) {
   std::string names;
   for (const std::string& output : stats.outputs) {
     names += (names.empty() ? "" : ", ") + output;

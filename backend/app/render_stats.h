@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "backend/app/scene_session.h"
+#include "backend/batch/scene_session.h"
 #include "backend/render/renderer.h"
 #include "backend/util/process.h"
 #include "backend/util/result.h"
@@ -27,7 +27,7 @@ struct RenderStats {
 };
 
 util::Result<void> write_stats(const std::string& path, const RenderStats& stats,
-                               const SceneSession& session);
-std::string summary(const RenderStats& stats, const SceneSession& session);
+                               const batch::SceneSession& session);
+std::string summary(const RenderStats& stats, const batch::SceneSession& session);
 
 }  // namespace octrace::app

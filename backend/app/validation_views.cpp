@@ -6,7 +6,7 @@
 #include <glm/gtc/matrix_transform.hpp>
 #include <memory>
 
-#include "backend/app/camera_choice.h"
+#include "backend/batch/camera_choice.h"
 #include "backend/render/renderer.h"
 #include "backend/util/interrupt.h"
 
@@ -117,7 +117,7 @@ util::Result<std::vector<ValidationView>> render_views(const scene::Scene& scene
     cameras = scene.cameras;
     make_names_unique(cameras);
   } else {
-    util::Result<scene::Camera> camera = choose_camera(options.camera, scene, aspect);
+    util::Result<scene::Camera> camera = batch::choose_camera(options.camera, scene, aspect);
     if (!camera) return camera.error();
     cameras.push_back(std::move(*camera));
   }

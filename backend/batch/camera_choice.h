@@ -6,7 +6,7 @@
 #include "backend/scene/scene.h"
 #include "backend/util/result.h"
 
-namespace octrace::app {
+namespace octrace::batch {
 
 // Empty: the scene's first camera, or one that frames its bounds. A name ending in .json: a camera
 // file. Else a camera's name, else its index in the scene. Usage errors list what there is.
@@ -16,4 +16,4 @@ util::Result<scene::Camera> choose_camera(const std::string& choice, const scene
 // The text of a camera file (--camera FILE.json) that gives the same camera.
 std::string camera_json(const scene::Camera& camera);
 
-}  // namespace octrace::app
+}  // namespace octrace::batch

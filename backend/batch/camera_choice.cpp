@@ -1,4 +1,4 @@
-#include "backend/app/camera_choice.h"
+#include "backend/batch/camera_choice.h"
 
 #include <fmt/format.h>
 
@@ -8,7 +8,7 @@
 
 #include "backend/scene/camera.h"
 
-namespace octrace::app {
+namespace octrace::batch {
 
 namespace {
 
@@ -77,4 +77,4 @@ std::string camera_json(const scene::Camera& camera) {
   return json.dump();
 }
 
-}  // namespace octrace::app
+}  // namespace octrace::batch

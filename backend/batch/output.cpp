@@ -1,4 +1,4 @@
-#include "backend/app/output.h"
+#include "backend/batch/output.h"
 
 #include <fmt/format.h>
 
@@ -6,9 +6,11 @@
 #include <filesystem>
 #include <set>
 
+#include "backend/batch/camera_choice.h"
 #include "backend/util/atomic_file.h"
+#include "backend/util/version.h"
 
-namespace octrace::app {
+namespace octrace::batch {
 
 namespace {
 
@@ -141,6 +143,10 @@ void add_channels(const render::Framebuffer& framebuffer, Aov aov, image::ImageV
 
 }  // namespace
 
+util::Error usage_error(const std::string& message) {
+  return {util::Exit::usage, "", message, "", ""};
+}
+
 util::Result<std::vector<Output>> plan_outputs(const std::vector<std::string>& arguments,
                                                const std::optional<std::string>& aov_list,
                                                const ImageSize& size) {
@@ -175,6 +181,19 @@ render::AovSet needed_aovs(const std::vector<Output>& outputs) {
   return needed;
 }
 
+bool needs_textures(const render::AovSet& aovs) {
+  for (const Aov aov : {Aov::beauty, Aov::albedo, Aov::normal}) {
+    if (aovs.test(static_cast<std::size_t>(aov))) return true;
+  }
+  return false;
+}
+
+Metadata view_metadata(const std::string& scene_source, const scene::Camera& camera) {
+  return {{"octrace:version", util::version()},
+          {"octrace:scene", scene_source},
+          {"octrace:camera", camera_json(camera)}};
+}
+
 util::Result<void> check_writable(const std::string& path) {
   util::Result<util::AtomicFile> probe = util::AtomicFile::create(path);
   if (!probe) return probe.error();
@@ -198,4 +217,4 @@ util::Result<void> write_output(const Output& output, const render::Framebuffer&
   return image::write_integer(output.path, view, encoding, depth_scale);
 }
 
-}  // namespace octrace::app
+}  // namespace octrace::batch

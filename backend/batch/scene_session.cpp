@@ -1,4 +1,4 @@
-#include "backend/app/scene_session.h"
+#include "backend/batch/scene_session.h"
 
 #include <fmt/format.h>
 
@@ -9,7 +9,7 @@
 #include "backend/util/log.h"
 #include "backend/util/process.h"
 
-namespace octrace::app {
+namespace octrace::batch {
 
 namespace {
 
@@ -93,4 +93,4 @@ util::Result<std::unique_ptr<SceneSession>> open_scene(const SceneRequest& reque
   return session;
 }
 
-}  // namespace octrace::app
+}  // namespace octrace::batch

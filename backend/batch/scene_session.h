@@ -11,7 +11,7 @@
 #include "backend/util/limits.h"
 #include "backend/util/result.h"
 
-namespace octrace::app {
+namespace octrace::batch {
 
 struct SceneRequest {
   std::string source;         // a file, or builtin:NAME
@@ -37,4 +37,4 @@ struct SceneSession {
 // it.
 util::Result<std::unique_ptr<SceneSession>> open_scene(const SceneRequest& request);
 
-}  // namespace octrace::app
+}  // namespace octrace::batch

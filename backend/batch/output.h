@@ -1,16 +1,23 @@
 // The image files that a render writes, and what goes into each.
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "backend/app/options.h"
 #include "backend/image/image.h"
 #include "backend/render/framebuffer.h"
+#include "backend/scene/camera.h"
 #include "backend/util/result.h"
 
-namespace octrace::app {
+namespace octrace::batch {
+
+struct ImageSize {
+  std::uint32_t width = 1280, height = 720;
+};
+
+util::Error usage_error(const std::string& message);
 
 enum class FileKind { exr, png, tiff, jpeg };
 
@@ -35,8 +42,13 @@ render::AovSet needed_aovs(const std::vector<Output>& outputs);
 // Exit 5 where a file could not be created; nothing stays behind.
 util::Result<void> check_writable(const std::string& path);
 
+// Whether any of the planes shows a texture; where not, only those that alpha tests need are read.
+bool needs_textures(const render::AovSet& aovs);
+
 using Metadata = std::vector<std::pair<std::string, std::string>>;
+// octrace:version, octrace:scene, octrace:camera.
+Metadata view_metadata(const std::string& scene_source, const scene::Camera& camera);
 util::Result<void> write_output(const Output& output, const render::Framebuffer& framebuffer,
                                 double depth_scale, const Metadata& metadata);
 
-}  // namespace octrace::app
+}  // namespace octrace::batch
