@@ -6,3 +6,7 @@ octrace_test(image_test
 octrace_test(image_header_test
   SOURCES image_header.cpp image_png_builder.cpp ${CMAKE_SOURCE_DIR}/backend/image/encoded_header.cpp
   LABELS unit)
+octrace_test(image_npy_test
+  SOURCES image_npy.cpp zip_reader.cpp
+  LIBRARIES GTest::gmock octrace_image octrace_util ZLIB::ZLIB fmt::fmt
+  LABELS unit)
