@@ -43,6 +43,7 @@ constexpr const char* kHelp = R"(Files:
   NAME.exr        every AOV of --aov, 32-bit float and UINT, in one file
   NAME.png .tif   one AOV: beauty, unless --aov names exactly one
   NAME.jpg        the same, 8-bit AOVs only
+  NAME.npz .npy   for NumPy: every AOV of --aov as an array of its own, or one AOV
   FILE:AOV        this AOV, whatever --aov says: -o depth.png:Z; an .exr takes a list, a.exr:Z,mask
 PNG, TIFF and JPEG hold beauty and albedo in sRGB, normals from [-1, 1], masks, uv and barycentric
 from [0, 1], ids as 16-bit numbers, depth and distance as 16-bit numbers: metres * --depth-scale, 65535
@@ -60,7 +61,7 @@ Examples:
 void declare_view(CLI::App& command, RenderOptions& options) {
   command
       .add_option("-o,--output", options.outputs,
-                  "image to write, .exr .png .tif or .jpg; may be repeated")
+                  "image to write, .exr .png .tif .jpg .npz or .npy; may be repeated")
       ->required()
       ->allow_extra_args(false)
       ->type_name("FILE[:AOV]");
@@ -231,8 +232,10 @@ util::Result<render::TraceStats> trace(const RenderOptions& options, const Scene
 util::Result<void> write_outputs(const RenderOptions& options, const Plan& plan,
                                  const Metadata& metadata, const render::Framebuffer& framebuffer,
                                  Progress& progress) {
-  util::Result<void> threads = image::set_threads(options.scene.build.threads);
-  if (!threads) return threads;
+  if (batch::needs_image_library(plan.outputs)) {
+    util::Result<void> threads = image::set_threads(options.scene.build.threads);
+    if (!threads) return threads;
+  }
   for (std::size_t i = 0; i < plan.outputs.size(); ++i) {
     progress.update(static_cast<double>(i) / static_cast<double>(plan.outputs.size()));
     util::Result<void> written =
@@ -247,7 +250,7 @@ util::Result<util::Exit> run_render(RenderOptions options) {
   RenderStats stats;
   util::Result<Plan> plan = make_plan(options);
   if (!plan) return plan.error();
-  preload_libraries();
+  preload_libraries(batch::needs_image_library(plan->outputs));
   Progress progress(options.progress);
 
   progress.stage("load");

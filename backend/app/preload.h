@@ -3,6 +3,7 @@
 
 namespace octrace::app {
 
-void preload_libraries();
+// image: files are written through the image library.
+void preload_libraries(bool image);
 
 }  // namespace octrace::app

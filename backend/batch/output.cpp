@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <set>
 
+#include "backend/batch/array_output.h"
 #include "backend/batch/camera_choice.h"
 #include "backend/util/atomic_file.h"
 #include "backend/util/version.h"
@@ -24,8 +25,14 @@ std::optional<FileKind> kind_of(const std::string& path) {
   if (extension == ".png") return FileKind::png;
   if (extension == ".tif" || extension == ".tiff") return FileKind::tiff;
   if (extension == ".jpg" || extension == ".jpeg") return FileKind::jpeg;
+  if (extension == ".npy") return FileKind::npy;
+  if (extension == ".npz") return FileKind::npz;
   return std::nullopt;
 }
+
+bool holds_many(FileKind kind) { return kind == FileKind::exr || kind == FileKind::npz; }
+
+bool is_array(FileKind kind) { return kind == FileKind::npy || kind == FileKind::npz; }
 
 // Nothing for positions, whose values no integer format holds.
 std::optional<image::Encoding> encoding_of(Aov aov) {
@@ -66,16 +73,17 @@ render::AovSet beauty_only() {
   return set;
 }
 
-util::Result<void> check_integer_output(const Output& output, const ImageSize& size) {
+util::Result<void> check_single_output(const Output& output, const ImageSize& size) {
   if (output.aovs.count() != 1) {
     return usage_error(fmt::format("-o {}: this format holds one AOV, {} were named", output.path,
                                    output.aovs.count()));
   }
+  if (output.kind == FileKind::npy) return {};
   const render::AovInfo& info = render::aov_info(only_aov(output.aovs));
   const std::optional<image::Encoding> encoding = encoding_of(info.aov);
   if (!encoding) {
     return usage_error(
-        fmt::format("-o {}: {} needs floating point: use .exr", output.path, info.option));
+        fmt::format("-o {}: {} needs floating point: use .exr or .npy", output.path, info.option));
   }
   const bool words =
       *encoding == image::Encoding::scaled16 || *encoding == image::Encoding::index16;
@@ -111,18 +119,18 @@ util::Result<Output> plan_output(const std::string& argument, const render::AovS
   const std::optional<FileKind> kind = kind_of(split.path);
   if (!kind) {
     return usage_error(
-        fmt::format("-o {}: the name must end in .exr, .png, .tif or .jpg", argument));
+        fmt::format("-o {}: the name must end in .exr, .png, .tif, .jpg, .npy or .npz", argument));
   }
   Output output{split.path, *kind, listed};
   if (split.aovs) {
     util::Result<render::AovSet> named = render::parse_aovs(*split.aovs);
     if (!named) return named.error();
     output.aovs = *named;
-  } else if (*kind != FileKind::exr && listed.count() != 1) {
+  } else if (!holds_many(*kind) && listed.count() != 1) {
     output.aovs = beauty_only();
   }
-  if (*kind != FileKind::exr) {
-    util::Result<void> checked = check_integer_output(output, size);
+  if (!holds_many(*kind)) {
+    util::Result<void> checked = check_single_output(output, size);
     if (!checked) return checked.error();
   }
   return output;
@@ -169,7 +177,8 @@ util::Result<std::vector<Output>> plan_outputs(const std::vector<std::string>& a
   const render::AovSet homeless = aov_list ? listed & ~needed_aovs(outputs) : render::AovSet();
   if (homeless.any()) {
     return usage_error(fmt::format(
-        "--aov asks for {}, and no -o holds it: add an .exr, or name it as in -o FILE.png:{}",
+        "--aov asks for {}, and no -o holds it: add an .exr or .npz, or name it as in -o "
+        "FILE.png:{}",
         render::aov_info(only_aov(homeless)).option, render::aov_info(only_aov(homeless)).option));
   }
   return outputs;
@@ -194,6 +203,11 @@ Metadata view_metadata(const std::string& scene_source, const scene::Camera& cam
           {"octrace:camera", camera_json(camera)}};
 }
 
+bool needs_image_library(const std::vector<Output>& outputs) {
+  return std::any_of(outputs.begin(), outputs.end(),
+                     [](const Output& output) { return !is_array(output.kind); });
+}
+
 util::Result<void> check_writable(const std::string& path) {
   util::Result<util::AtomicFile> probe = util::AtomicFile::create(path);
   if (!probe) return probe.error();
@@ -202,6 +216,9 @@ util::Result<void> check_writable(const std::string& path) {
 
 util::Result<void> write_output(const Output& output, const render::Framebuffer& framebuffer,
                                 double depth_scale, const Metadata& metadata) {
+  if (is_array(output.kind)) {
+    return write_arrays(output.path, output.kind == FileKind::npz, framebuffer, output.aovs);
+  }
   image::ImageView view{framebuffer.width(), framebuffer.height(), {}, metadata};
   for (const render::AovInfo& info : render::aov_table()) {
     if (output.aovs.test(static_cast<std::size_t>(info.aov))) {

@@ -19,25 +19,26 @@ struct ImageSize {
 
 util::Error usage_error(const std::string& message);
 
-enum class FileKind { exr, png, tiff, jpeg };
+enum class FileKind { exr, png, tiff, jpeg, npy, npz };
 
 struct Output {
   std::string path;
   FileKind kind = FileKind::exr;
-  render::AovSet aovs;  // one, but for an EXR
+  render::AovSet aovs;  // one, but for an EXR or NPZ
 };
 
 // The arguments of -o: PATH, or PATH:AOV[,AOV...]. The text after the last colon names AOVs when it
-// holds neither '.' nor '/'. An EXR without names holds those of --aov (default beauty); a PNG,
-// TIFF or JPEG holds the one that --aov names, where that is one, else beauty. Usage errors: an
-// unknown extension or AOV, a plane that the format cannot hold, a path given twice, an AOV asked
-// for by
-// --aov that no file holds.
+// holds neither '.' nor '/'. An EXR or NPZ without names holds those of --aov (default beauty); a
+// PNG, TIFF, JPEG or NPY holds the one that --aov names, where that is one, else beauty. Usage
+// errors: an unknown extension or AOV, a plane that the format cannot hold, a path given twice, an
+// AOV asked for by --aov that no file holds.
 util::Result<std::vector<Output>> plan_outputs(const std::vector<std::string>& arguments,
                                                const std::optional<std::string>& aov_list,
                                                const ImageSize& size);
 
 render::AovSet needed_aovs(const std::vector<Output>& outputs);
+// Whether any of the files is written through the image library (image::preload).
+bool needs_image_library(const std::vector<Output>& outputs);
 
 // Exit 5 where a file could not be created; nothing stays behind.
 util::Result<void> check_writable(const std::string& path);

@@ -175,7 +175,8 @@ TEST_P(FullDisk, LeavesNothing) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Formats, FullDisk, ::testing::Values("a.exr", "a.png", "a.tif", "a.jpg"));
+INSTANTIATE_TEST_SUITE_P(Formats, FullDisk,
+                         ::testing::Values("a.exr", "a.png", "a.tif", "a.jpg", "a.npy", "a.npz"));
 
 TEST(FullDisk, KeepsTheFileThatWasThere) {
   Scratch scratch;
