@@ -40,6 +40,17 @@ util::Result<void> load_builtin(const SceneRequest& request, SceneSession& sessi
   return {};
 }
 
+util::Result<void> load_animated(const SceneRequest& request, const scene::FlattenOptions& options,
+                                 gltf::Document& document, SceneSession& session) {
+  // The report on the document comes after flattening, so that it needs a copy here.
+  auto animator = scene::Animator::open(request.collect_info ? document : std::move(document),
+                                        options, request.animation, request.time, session.scene);
+  if (!animator) return animator.error();
+  if (request.collect_info) session.info = scene::collect_info(document, session.scene);
+  if (request.moving && (*animator)->moves()) session.animator = std::move(*animator);
+  return {};
+}
+
 util::Result<void> load_file(const SceneRequest& request, SceneSession& session) {
   util::Result<gltf::Document> document =
       gltf::load(request.source, {request.limits, request.missing_images_warn});
@@ -51,6 +62,7 @@ util::Result<void> load_file(const SceneRequest& request, SceneSession& session)
   options.missing_images_warn = request.missing_images_warn;
   options.limits = request.limits;
   options.decode = request.decode_images ? decode_image : white_image;
+  if (request.time || request.moving) return load_animated(request, options, *document, session);
   util::Result<scene::Scene> flattened = scene::flatten(*document, options);
   if (!flattened) return flattened.error();
   session.scene = std::move(*flattened);
@@ -73,7 +85,8 @@ util::Result<std::unique_ptr<SceneSession>> open_scene(const SceneRequest& reque
   util::log_verbose(fmt::format("{}: {} triangles, loaded in {:.1f} ms", request.source,
                                 session->scene.triangles.size(), session->load_ms));
 
-  octree::BuildOptions build = request.build;
+  octree::BuildOptions& build = session->build;
+  build = request.build;
   build.max_bytes = request.limits.max_scene_bytes;
   const util::Timer build_timer;
   util::Result<octree::Octree> octree = octree::build(session->scene, build);
@@ -91,6 +104,19 @@ util::Result<std::unique_ptr<SceneSession>> open_scene(const SceneRequest& reque
     util::log_verbose(fmt::format("octree: verified in {:.1f} ms", session->verify_ms));
   }
   return session;
+}
+
+util::Result<scene::SceneChanges> SceneSession::move_to(scene::Time time) {
+  if (!animator) return scene::SceneChanges{};
+  auto changes = animator->move_to(time, scene);
+  if (!changes || !changes->geometry()) return changes;
+  auto updated = octree::update(scene, build, {}, octree, upkeep);
+  if (!updated) return updated.error();
+  return changes;
+}
+
+util::Result<scene::Moment> SceneSession::at(scene::Time time) const {
+  return animator ? animator->at(time, scene) : util::Result<scene::Moment>(scene::Moment());
 }
 
 }  // namespace octrace::batch

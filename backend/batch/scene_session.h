@@ -6,6 +6,8 @@
 #include <string>
 
 #include "backend/octree/octree.h"
+#include "backend/octree/update.h"
+#include "backend/scene/animator.h"
 #include "backend/scene/scene.h"
 #include "backend/scene/scene_info.h"
 #include "backend/util/limits.h"
@@ -19,6 +21,9 @@ struct SceneRequest {
   bool decode_images = true;  // false: textures are white, for uses that look at no image
   bool need_textures = true;  // false: only textures that alpha tests need are decoded
   bool missing_images_warn = false;
+  std::string animation;       // --animation; where a time is given or the session is to move
+  scene::Time time;            // nothing: at rest
+  bool moving = false;         // keep what SceneSession::move_to() and at() need
   bool collect_info = false;   // fill SceneSession::info
   bool verify = false;         // check the octree
   octree::BuildOptions build;  // max_bytes comes from limits
@@ -30,7 +35,18 @@ struct SceneSession {
   scene::Scene scene;
   octree::Octree octree;
   std::optional<scene::SceneInfo> info;
+  octree::BuildOptions build;                 // as the octree was built
+  octree::Upkeep upkeep;                      // what the last move did to it
+  std::unique_ptr<scene::Animator> animator;  // null: nothing moves
   double load_ms = 0.0, build_ms = 0.0, verify_ms = 0.0;
+
+  // Scene and octree at another time; says which arrays of the scene changed (any(): the octree's
+  // as well where geometry()). Renderers of the session must be told: Renderer::refresh(). After an
+  // error the next call puts the session right. Nothing happens where nothing moves.
+  util::Result<scene::SceneChanges> move_to(scene::Time time);
+
+  // Vertices and cameras at another time, for motion; the session stays where it is.
+  util::Result<scene::Moment> at(scene::Time time) const;
 };
 
 // Warnings of the scene are logged. The session stays where it is, so that renderers may refer to

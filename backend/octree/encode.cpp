@@ -78,11 +78,9 @@ Slots slots_by_octant(std::span<const Child> children, const Box& parent) {
   return slots;
 }
 
-void encode(std::span<const Child> children, const Slots& slots, TreeNode& tree) {
+void quantise(std::span<const Child> children, const Slots& slots, kernels::Node& node) {
   Box bounds;
   for (const Child& child : children) bounds.add(child.box);
-  kernels::Node& node = tree.node;
-  node = {};
   for (int axis = 0; axis < 3; ++axis) {
     node.origin[axis] = bounds.lower[axis];
     node.exponent[axis] = exponent_for(bounds.lower[axis], bounds.upper[axis]);
@@ -93,6 +91,12 @@ void encode(std::span<const Child> children, const Slots& slots, TreeNode& tree)
       node.upper[axis][slot] = step_above(node.origin[axis], scale, children[c].box.upper[axis]);
     }
   }
+}
+
+void encode(std::span<const Child> children, const Slots& slots, TreeNode& tree) {
+  kernels::Node& node = tree.node;
+  node = {};
+  quantise(children, slots, node);
   for (std::size_t c = 0; c < children.size(); ++c) {
     const int slot = slots[c];
     const Child& child = children[c];

@@ -47,6 +47,9 @@ struct Child {
 using Slots = std::array<std::uint8_t, kernels::kChildren>;
 Slots slots_by_octant(std::span<const Child> children, const Box& parent);
 
+// A node's frame, and its children's boxes rounded outwards into it.
+void quantise(std::span<const Child> children, const Slots& slots, kernels::Node& node);
+
 // Fills a TreeNode: quantises the boxes outwards and sums up the subtree.
 void encode(std::span<const Child> children, const Slots& slots, TreeNode& node);
 

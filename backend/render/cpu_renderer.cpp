@@ -73,14 +73,26 @@ TileFailure trace_tile(const View& view, const kernels::CpuTracer& tracer, const
 
 class CpuRenderer final : public Renderer {
  public:
-  CpuRenderer(const scene::Scene& scene, const octree::Octree& octree) : scene_(scene.view()) {
-    scene_.octree = octree.view();
+  CpuRenderer(const scene::Scene& scene, const octree::Octree& octree)
+      : source_(scene), octree_(octree) {
+    look();
   }
 
   util::Result<TraceStats> render(const kernels::RayCamera& camera, const Settings& settings,
                                   Framebuffer& framebuffer) override;
+  util::Result<void> refresh(const scene::SceneChanges&) override {
+    look();
+    return {};
+  }
 
  private:
+  void look() {
+    scene_ = source_.view();
+    scene_.octree = octree_.view();
+  }
+
+  const scene::Scene& source_;
+  const octree::Octree& octree_;
   kernels::SceneView scene_;
   kernels::CpuTracer tracer_;
 };

@@ -66,7 +66,7 @@ Error memory_error(const char* what, std::uint64_t wanted, int device) {
 util::Result<std::unique_ptr<CudaRenderer>> CudaRenderer::create(const scene::Scene& scene,
                                                                  const octree::Octree& octree,
                                                                  int device) {
-  std::unique_ptr<CudaRenderer> renderer(new CudaRenderer);
+  std::unique_ptr<CudaRenderer> renderer(new CudaRenderer(scene, octree));
   renderer->device_ = device;
   kernels::cuda::Device info{};
   Status status = kernels::cuda::select_device(device);
@@ -87,6 +87,16 @@ util::Result<std::unique_ptr<CudaRenderer>> CudaRenderer::create(const scene::Sc
   }
   if (!status.ok()) return cuda_error(status);
   return renderer;
+}
+
+util::Result<void> CudaRenderer::refresh(const scene::SceneChanges& changes) {
+  Status status = kernels::cuda::select_device(device_);
+  if (status.ok()) status = scene_.update(source_, octree_, changes);
+  if (status.out_of_memory()) {
+    return memory_error("the scene", DeviceScene::bytes_needed(source_, octree_), device_);
+  }
+  if (!status.ok()) return cuda_error(status);
+  return {};
 }
 
 Status CudaRenderer::prepare(std::uint64_t row_bytes, std::uint32_t rows) {

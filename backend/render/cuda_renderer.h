@@ -18,6 +18,7 @@ class CudaRenderer final : public Renderer {
 
   util::Result<TraceStats> render(const kernels::RayCamera& camera, const Settings& settings,
                                   Framebuffer& framebuffer) override;
+  util::Result<void> refresh(const scene::SceneChanges& changes) override;
 
  private:
   // Two bands are in flight: one is traced while the other is copied back.
@@ -29,13 +30,16 @@ class CudaRenderer final : public Renderer {
     std::uint32_t first_row = 0, rows = 0;  // rows 0: idle
   };
 
-  CudaRenderer() = default;
+  CudaRenderer(const scene::Scene& scene, const octree::Octree& octree)
+      : source_(scene), octree_(octree) {}
   kernels::cuda::Status prepare(std::uint64_t bytes_a_row, std::uint32_t rows);
   util::Result<std::uint32_t> choose_rows(const Framebuffer& framebuffer);
   kernels::cuda::Status start(Band& band, const kernels::cuda::View& view,
                               const Framebuffer& framebuffer);
   util::Result<void> finish(Band& band, Framebuffer& framebuffer, TraceStats& stats);
 
+  const scene::Scene& source_;
+  const octree::Octree& octree_;
   int device_ = 0;
   std::string device_name_;
   DeviceScene scene_;

@@ -43,6 +43,16 @@ class CudaOrCpu final : public Renderer {
     return cpu_->render(camera, settings, framebuffer);
   }
 
+  util::Result<void> refresh(const scene::SceneChanges& changes) override {
+    if (cpu_) return cpu_->refresh(changes);
+    util::Result<void> result = cuda_->refresh(changes);
+    if (result || result.error().exit != util::Exit::limit) return result;
+    util::log_warning(result.error().message + "; rendering on the CPU");
+    cuda_.reset();
+    cpu_ = make_cpu_renderer(scene_, octree_);
+    return {};
+  }
+
  private:
   const scene::Scene& scene_;
   const octree::Octree& octree_;

@@ -84,4 +84,33 @@ Status DeviceScene::upload(const scene::Scene& scene, const octree::Octree& octr
   return status;
 }
 
+Status DeviceScene::update(const scene::Scene& scene, const octree::Octree& octree,
+                           const scene::SceneChanges& changes) {
+  kernels::SceneView from = host_view(scene, octree);
+  const kernels::SceneView to = view_;
+  if (from.octree.nodes.size != to.octree.nodes.size || from.lights.size != to.lights.size) {
+    return upload(scene, octree);
+  }
+  const auto start = std::chrono::steady_clock::now();
+  Status status;
+  const auto copy = [&]<class T>(bool changed, const Span<T>& host, const Span<T>& device) {
+    if (!changed || host.empty() || !status.ok()) return;
+    status = kernels::cuda::copy_to_device(const_cast<T*>(device.data), host.data,
+                                           host.size * sizeof(T), nullptr);
+  };
+  copy(changes.geometry(), from.octree.nodes, to.octree.nodes);
+  copy(changes.geometry(), from.octree.triangles, to.octree.triangles);
+  copy(changes.positions, from.positions, to.positions);
+  copy(changes.triangles, from.triangles, to.triangles);
+  copy(changes.normals, from.normals, to.normals);
+  copy(changes.tangents, from.tangents, to.tangents);
+  copy(changes.uvs, from.uvs, to.uvs);
+  copy(changes.colors, from.colors, to.colors);
+  copy(changes.lights, from.lights, to.lights);
+  view_.diagonal = from.diagonal;
+  if (status.ok()) status = kernels::cuda::synchronize(nullptr);
+  seconds_ = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  return status;
+}
+
 }  // namespace octrace::render

@@ -6,6 +6,7 @@
 #include "backend/octree/octree.h"
 #include "backend/render/device_memory.h"
 #include "backend/scene/scene.h"
+#include "backend/scene/scene_changes.h"
 
 namespace octrace::render {
 
@@ -13,6 +14,11 @@ class DeviceScene {
  public:
   // Out of memory is reported as such (Status::out_of_memory); nothing is left allocated then.
   kernels::cuda::Status upload(const scene::Scene& scene, const octree::Octree& octree);
+
+  // Copies what changed to where it lies, or everything where arrays have other sizes (a rebuilt
+  // octree). No render of the scene may be under way.
+  kernels::cuda::Status update(const scene::Scene& scene, const octree::Octree& octree,
+                               const scene::SceneChanges& changes);
 
   const kernels::SceneView& view() const { return view_; }  // pointers into device memory
   std::uint64_t bytes() const { return bytes_; }

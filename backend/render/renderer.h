@@ -9,6 +9,7 @@
 #include "backend/octree/octree.h"
 #include "backend/render/framebuffer.h"
 #include "backend/scene/scene.h"
+#include "backend/scene/scene_changes.h"
 #include "kernels/camera.h"
 #include "kernels/render_params.h"
 
@@ -39,6 +40,10 @@ class Renderer {
   virtual ~Renderer() = default;
   virtual util::Result<TraceStats> render(const kernels::RayCamera& camera,
                                           const Settings& settings, Framebuffer& framebuffer) = 0;
+
+  // To be called between renders where the scene or the octree that the renderer was made for has
+  // changed (scene::Animator, octree::update()). Errors as when a renderer is made.
+  virtual util::Result<void> refresh(const scene::SceneChanges& changes) = 0;
 };
 
 // The scene and the octree must outlive the renderer.

@@ -53,14 +53,18 @@ glm::dvec3 unit_or(const glm::dvec3& v, const glm::dvec3& otherwise) {
 
 }  // namespace
 
-Vertices read_vertices(const gltf::Document& document, const tinygltf::Primitive& primitive) {
+Vertices read_vertices(const gltf::Document& document, const tinygltf::Primitive& primitive,
+                       const VertexParts& parts) {
   Vertices vertices;
   const int position = find_attribute(primitive.attributes, "POSITION");
   if (position < 0) return vertices;
   const std::size_t count = document.model.accessors[position].count;
   vertices.positions = read<glm::dvec3>(document, primitive, "POSITION", count);
-  vertices.normals = read<glm::dvec3>(document, primitive, "NORMAL", count);
-  vertices.tangents = read<glm::dvec4>(document, primitive, "TANGENT", count);
+  if (parts.directions) {
+    vertices.normals = read<glm::dvec3>(document, primitive, "NORMAL", count);
+    vertices.tangents = read<glm::dvec4>(document, primitive, "TANGENT", count);
+  }
+  if (!parts.plain) return vertices;
   vertices.uvs[0] = read<glm::dvec2>(document, primitive, "TEXCOORD_0", count);
   vertices.uvs[1] = read<glm::dvec2>(document, primitive, "TEXCOORD_1", count);
   vertices.colors = read<glm::dvec4>(document, primitive, "COLOR_0", count);
@@ -78,7 +82,7 @@ void add_morph_targets(const gltf::Document& document, const tinygltf::Primitive
     if (weights[t] == 0.0) continue;
     const auto add = [&](const char* name, auto& values) {
       const int accessor = find_attribute(primitive.targets[t], name);
-      if (accessor >= 0) accumulate(document, accessor, weights[t], values);
+      if (accessor >= 0 && !values.empty()) accumulate(document, accessor, weights[t], values);
     };
     add("POSITION", vertices.positions);
     add("NORMAL", vertices.normals);

@@ -26,10 +26,16 @@ struct Vertices {
   std::vector<glm::dvec4> colors;
 };
 
-Vertices read_vertices(const gltf::Document& document, const tinygltf::Primitive& primitive);
+// What to read beside positions.
+struct VertexParts {
+  bool directions = true;  // normals and tangents
+  bool plain = true;       // texture coordinates and colours
+};
+Vertices read_vertices(const gltf::Document& document, const tinygltf::Primitive& primitive,
+                       const VertexParts& parts = {});
 
-// Adds weight times each morph target's differences. Normals and tangents are left to be normalised
-// by whoever moves them to the world.
+// Adds weight times each morph target's differences, to what has been read. Normals and tangents
+// are left to be normalised by whoever moves them to the world.
 void add_morph_targets(const gltf::Document& document, const tinygltf::Primitive& primitive,
                        std::span<const double> weights, Vertices& vertices);
 

@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <set>
 
-#include "backend/scene/flatten_geometry.h"
 #include "backend/scene/flatten_materials.h"
 #include "backend/scene/flatten_placed.h"
+#include "backend/scene/flatten_steps.h"
 #include "backend/scene/names.h"
 #include "backend/scene/pose.h"
 
@@ -78,6 +78,13 @@ util::Result<Scene> flatten(const gltf::Document& document, const FlattenOptions
 
 util::Result<Scene> flatten(const gltf::Document& document, const Pose& pose,
                             const FlattenOptions& options) {
+  const auto plan = plan_scene(document, options);
+  if (!plan) return plan.error();
+  Winding winding;
+  return place_scene(document, *plan, pose, options, winding);
+}
+
+util::Result<ScenePlan> plan_scene(const gltf::Document& document, const FlattenOptions& options) {
   const tinygltf::Model& model = document.model;
   if (model.nodes.size() > options.limits.max_nodes) {
     return util::Error{util::Exit::limit, "",
@@ -87,17 +94,26 @@ util::Result<Scene> flatten(const gltf::Document& document, const Pose& pose,
   }
   const auto roots = root_nodes(document, options.scene);
   if (!roots) return roots.error();
-  const std::vector<int> nodes = reachable_nodes(model, *roots);
-  const auto plan = plan_geometry(document, nodes, options.limits);
-  if (!plan) return plan.error();
+  ScenePlan plan;
+  plan.nodes = reachable_nodes(model, *roots);
+  auto geometry = plan_geometry(document, plan.nodes, options.limits);
+  if (!geometry) return geometry.error();
+  plan.geometry = std::move(*geometry);
+  return plan;
+}
 
+util::Result<Scene> place_scene(const gltf::Document& document, const ScenePlan& plan,
+                                const Pose& pose, const FlattenOptions& options, Winding& winding) {
+  const tinygltf::Model& model = document.model;
   Scene scene;
-  scene.warnings = plan->warnings;
+  scene.warnings = plan.geometry.warnings;
   const std::vector<glm::dmat4> worlds = world_matrices(model, pose);
-  if (auto ok = place_geometry(document, *plan, pose, worlds, scene); !ok) return ok.error();
-  if (auto ok = place_cameras(document, nodes, worlds, scene); !ok) return ok.error();
-  if (auto ok = place_lights(document, nodes, worlds, scene); !ok) return ok.error();
-  if (auto ok = place_materials(document, options, plan->default_material, scene); !ok) {
+  if (auto ok = place_geometry(document, plan.geometry, pose, worlds, scene, winding); !ok) {
+    return ok.error();
+  }
+  if (auto ok = place_cameras(document, plan.nodes, worlds, scene); !ok) return ok.error();
+  if (auto ok = place_lights(document, plan.nodes, worlds, scene); !ok) return ok.error();
+  if (auto ok = place_materials(document, options, plan.geometry.default_material, scene); !ok) {
     return ok.error();
   }
   drop_duplicates(scene.warnings);

@@ -8,6 +8,7 @@
 #include "backend/gltf/document.h"
 #include "backend/scene/pose.h"
 #include "backend/scene/scene.h"
+#include "backend/scene/scene_changes.h"
 #include "backend/util/limits.h"
 #include "backend/util/result.h"
 
@@ -39,9 +40,27 @@ struct GeometryPlan {
 util::Result<GeometryPlan> plan_geometry(const gltf::Document& document,
                                          const std::vector<int>& nodes, const util::Limits& limits);
 
+// By geometry: 1 where corners b and c are swapped, because the node mirrors.
+using Winding = std::vector<std::uint8_t>;
+
 // Fills the arrays of geometry and the bounds.
 util::Result<void> place_geometry(const gltf::Document& document, const GeometryPlan& plan,
                                   const Pose& pose, const std::vector<glm::dmat4>& worlds,
-                                  Scene& scene);
+                                  Scene& scene, Winding& winding);
+
+// Of a plan's instances, those that `chosen` (by geometry) names; places in the arrays stay.
+GeometryPlan part_of(const GeometryPlan& plan, const std::vector<bool>& chosen);
+
+// Places a part of a plan again, in a scene in which the whole plan has been placed before. The
+// outcome has the same bits as a scene placed anew. After an error the part must be placed again.
+util::Result<SceneChanges> replace_geometry(const gltf::Document& document,
+                                            const GeometryPlan& part, const Pose& pose,
+                                            const std::vector<glm::dmat4>& worlds, Scene& scene,
+                                            Winding& winding);
+
+// The same of positions alone: those of another moment, beside a scene.
+util::Result<void> replace_positions(const gltf::Document& document, const GeometryPlan& part,
+                                     const Pose& pose, const std::vector<glm::dmat4>& worlds,
+                                     std::vector<kernels::Vec3>& positions);
 
 }  // namespace octrace::scene

@@ -6,6 +6,7 @@
 #include <atomic>
 #include <cmath>
 #include <optional>
+#include <span>
 
 #include "backend/scene/deform.h"
 #include "backend/scene/flatten_geometry.h"
@@ -23,25 +24,41 @@ constexpr std::size_t kGrain = 4096;  // vertices a task
 // What is read once of a primitive, for all nodes that show it.
 struct SourceData {
   Vertices vertices;
-  std::vector<kernels::Triangle> triangles;
+  std::vector<kernels::Triangle> triangles;  // of a first placing only
   SkinBinding binding;
 };
+
+// Where placed vertices go. What is not asked for is empty.
+struct Arrays {
+  std::span<kernels::Vec3> positions, normals;
+  std::span<kernels::Vec4> tangents;
+  std::span<kernels::Vec2> uvs;
+  std::span<kernels::Vec4> colors;
+  std::span<kernels::Triangle> triangles;
+  std::span<std::uint32_t> triangle_geometry;  // of a first placing only
+  std::span<std::uint8_t> winding;
+};
+
+Arrays arrays_of(Scene& scene, Winding& winding) {
+  return {
+      scene.positions, scene.normals, scene.tangents, scene.uvs, scene.colors, scene.triangles, {},
+      winding};
+}
+
+bool morphs_plain_attributes(const tinygltf::Primitive& primitive) {
+  return std::any_of(primitive.targets.begin(), primitive.targets.end(), [](const auto& target) {
+    return target.contains("TEXCOORD_0") || target.contains("TEXCOORD_1") ||
+           target.contains("COLOR_0");
+  });
+}
 
 class Placer {
  public:
   Placer(const gltf::Document& document, const GeometryPlan& plan, const Pose& pose,
-         const std::vector<glm::dmat4>& worlds, Scene& scene)
-      : document_(document), plan_(plan), pose_(pose), worlds_(worlds), scene_(scene) {}
+         const std::vector<glm::dmat4>& worlds, const Arrays& to)
+      : document_(document), plan_(plan), pose_(pose), worlds_(worlds), to_(to) {}
 
   util::Result<void> place() {
-    scene_.geometries = plan_.geometries;
-    scene_.positions.resize(plan_.vertices);
-    scene_.triangles.resize(plan_.triangles);
-    scene_.triangle_geometry.resize(plan_.triangles);
-    scene_.normals.resize(plan_.normals);
-    scene_.tangents.resize(plan_.tangents);
-    scene_.uvs.resize(plan_.uvs);
-    scene_.colors.resize(plan_.colors);
     // One slot a source, so that the error that is reported does not depend on timing.
     std::vector<std::optional<util::Error>> errors(plan_.sources.size());
     tbb::parallel_for(std::size_t{0}, plan_.sources.size(), [&](std::size_t i) {
@@ -50,11 +67,14 @@ class Placer {
     for (const auto& error : errors) {
       if (error) return *error;
     }
-    scene_.bounds = bounds_of(scene_.positions);
     return {};
   }
 
+  bool wound_otherwise() const { return wound_otherwise_; }  // some geometry, than before
+
  private:
+  bool first() const { return !to_.triangle_geometry.empty(); }
+
   util::Error error(util::Exit exit, std::string code, std::string pointer,
                     std::string message) const {
     return {exit, std::move(code), std::move(message), document_.file, std::move(pointer)};
@@ -69,11 +89,8 @@ class Placer {
         document_.model.meshes[source.mesh].primitives[source.primitive];
     auto data = read(source, primitive);
     if (!data) return data.error();
-    const bool morphs =
-        std::any_of(source.instances.begin(), source.instances.end(),
-                    [&](const auto& instance) { return morph_active(primitive, instance.node); });
     for (const auto& instance : source.instances) {
-      if (!morphs) {
+      if (!morph_active(primitive, instance.node)) {
         if (auto ok = place_instance(source, instance, *data, data->vertices); !ok) return ok;
         continue;
       }
@@ -93,13 +110,33 @@ class Placer {
   util::Result<SourceData> read(const GeometryPlan::Source& source,
                                 const tinygltf::Primitive& primitive) const {
     SourceData data;
-    data.vertices = read_vertices(document_, primitive);
+    const VertexParts parts{
+        !to_.normals.empty() || !to_.tangents.empty(),
+        first() || (!to_.winding.empty() && morphs_plain_attributes(primitive))};
+    data.vertices = read_vertices(document_, primitive, parts);
     const kernels::Geometry& geometry = plan_.geometries[source.instances.front().geometry];
+    if (data.vertices.positions.size() != geometry.vertex_count) {
+      return error(util::Exit::internal, "", primitive_pointer(source),
+                   fmt::format("has {} vertices, {} were planned", data.vertices.positions.size(),
+                               geometry.vertex_count));
+    }
+    if (first()) {
+      if (auto ok = read_triangles(source, primitive, geometry, data); !ok) return ok.error();
+    }
+    const bool skinned = std::any_of(
+        source.instances.begin(), source.instances.end(),
+        [&](const auto& instance) { return document_.model.nodes[instance.node].skin >= 0; });
+    if (skinned) data.binding = read_skin_binding(document_, primitive);
+    return data;
+  }
+
+  util::Result<void> read_triangles(const GeometryPlan::Source& source,
+                                    const tinygltf::Primitive& primitive,
+                                    const kernels::Geometry& geometry, SourceData& data) const {
     std::vector<std::uint32_t> indices;
     if (primitive.indices >= 0) indices = document_.read_uints(primitive.indices);
     data.triangles = triangulate(primitive.mode, indices, geometry.vertex_count);
-    if (data.triangles.size() != geometry.triangle_count ||
-        data.vertices.positions.size() != geometry.vertex_count) {
+    if (data.triangles.size() != geometry.triangle_count) {
       return error(util::Exit::internal, "", primitive_pointer(source),
                    fmt::format("has {} triangles, {} were planned", data.triangles.size(),
                                geometry.triangle_count));
@@ -107,17 +144,11 @@ class Placer {
     const auto outside = std::find_if(indices.begin(), indices.end(), [&](std::uint32_t index) {
       return index >= geometry.vertex_count;
     });
-    if (outside != indices.end()) {
-      return error(util::Exit::invalid_input, "ACCESSOR_INDEX_OOB",
-                   primitive_pointer(source) + "/indices",
-                   fmt::format("index {} is {}, there are {} vertices", outside - indices.begin(),
-                               *outside, geometry.vertex_count));
-    }
-    const bool skinned = std::any_of(
-        source.instances.begin(), source.instances.end(),
-        [&](const auto& instance) { return document_.model.nodes[instance.node].skin >= 0; });
-    if (skinned) data.binding = read_skin_binding(document_, primitive);
-    return data;
+    if (outside == indices.end()) return {};
+    return error(util::Exit::invalid_input, "ACCESSOR_INDEX_OOB",
+                 primitive_pointer(source) + "/indices",
+                 fmt::format("index {} is {}, there are {} vertices", outside - indices.begin(),
+                             *outside, geometry.vertex_count));
   }
 
   util::Result<void> check_binding(const GeometryPlan::Source& source, const SkinBinding& binding,
@@ -183,7 +214,16 @@ class Placer {
                                kMaxCoordinate));
     }
     place_plain_attributes(geometry, vertices);
-    place_triangles(geometry, instance.geometry, data.triangles, mirrors);
+    if (first()) {
+      place_triangles(geometry, instance.geometry, data.triangles, mirrors);
+    } else if (!to_.winding.empty() && to_.winding[instance.geometry] != mirrors) {
+      for (std::size_t t = 0; t < geometry.triangle_count; ++t) {
+        kernels::Triangle& triangle = to_.triangles[geometry.first_triangle + t];
+        std::swap(triangle.b, triangle.c);
+      }
+      to_.winding[instance.geometry] = mirrors;
+      wound_otherwise_ = true;
+    }
     return {};
   }
 
@@ -192,13 +232,12 @@ class Placer {
     const glm::dvec3 p(matrix * glm::dvec4(vertices.positions[v], 1.0));
     const auto fits = [](double x) { return std::abs(x) <= double{kMaxCoordinate}; };
     if (!fits(p.x) || !fits(p.y) || !fits(p.z)) return false;
-    scene_.positions[geometry.first_vertex + v] = kernels::Vec3(p);
-    if (geometry.normals != kernels::kNone) {
-      scene_.normals[geometry.normals + v] = kernels::Vec3(directions.normal(vertices.normals[v]));
+    to_.positions[geometry.first_vertex + v] = kernels::Vec3(p);
+    if (!vertices.normals.empty()) {
+      to_.normals[geometry.normals + v] = kernels::Vec3(directions.normal(vertices.normals[v]));
     }
-    if (geometry.tangents != kernels::kNone) {
-      scene_.tangents[geometry.tangents + v] =
-          kernels::Vec4(directions.tangent(vertices.tangents[v]));
+    if (!vertices.tangents.empty()) {
+      to_.tangents[geometry.tangents + v] = kernels::Vec4(directions.tangent(vertices.tangents[v]));
     }
     return true;
   }
@@ -211,9 +250,9 @@ class Placer {
         to[first + v] = typename std::decay_t<decltype(to)>::value_type(from[v]);
       }
     };
-    copy(vertices.uvs[0], scene_.uvs, geometry.uv0);
-    copy(vertices.uvs[1], scene_.uvs, geometry.uv1);
-    copy(vertices.colors, scene_.colors, geometry.colors);
+    copy(vertices.uvs[0], to_.uvs, geometry.uv0);
+    copy(vertices.uvs[1], to_.uvs, geometry.uv1);
+    copy(vertices.colors, to_.colors, geometry.colors);
   }
 
   void place_triangles(const kernels::Geometry& geometry, std::uint32_t index,
@@ -222,24 +261,84 @@ class Placer {
     for (std::size_t t = 0; t < triangles.size(); ++t) {
       auto [a, b, c] = triangles[t];
       if (mirrors) std::swap(b, c);
-      scene_.triangles[geometry.first_triangle + t] = {base + a, base + b, base + c};
-      scene_.triangle_geometry[geometry.first_triangle + t] = index;
+      to_.triangles[geometry.first_triangle + t] = {base + a, base + b, base + c};
+      to_.triangle_geometry[geometry.first_triangle + t] = index;
     }
+    to_.winding[index] = mirrors;
   }
 
   const gltf::Document& document_;
   const GeometryPlan& plan_;
   const Pose& pose_;
   const std::vector<glm::dmat4>& worlds_;
-  Scene& scene_;
+  const Arrays to_;
+  std::atomic<bool> wound_otherwise_{false};
 };
 
 }  // namespace
 
 util::Result<void> place_geometry(const gltf::Document& document, const GeometryPlan& plan,
                                   const Pose& pose, const std::vector<glm::dmat4>& worlds,
-                                  Scene& scene) {
-  return Placer(document, plan, pose, worlds, scene).place();
+                                  Scene& scene, Winding& winding) {
+  scene.geometries = plan.geometries;
+  scene.positions.resize(plan.vertices);
+  scene.triangles.resize(plan.triangles);
+  scene.triangle_geometry.resize(plan.triangles);
+  scene.normals.resize(plan.normals);
+  scene.tangents.resize(plan.tangents);
+  scene.uvs.resize(plan.uvs);
+  scene.colors.resize(plan.colors);
+  winding.assign(plan.geometries.size(), 0);
+  Arrays to = arrays_of(scene, winding);
+  to.triangle_geometry = scene.triangle_geometry;
+  if (auto ok = Placer(document, plan, pose, worlds, to).place(); !ok) return ok;
+  scene.bounds = bounds_of(scene.positions);
+  return {};
+}
+
+GeometryPlan part_of(const GeometryPlan& plan, const std::vector<bool>& chosen) {
+  GeometryPlan part;
+  part.geometries = plan.geometries;
+  for (const GeometryPlan::Source& source : plan.sources) {
+    GeometryPlan::Source some{source.mesh, source.primitive, {}};
+    for (const GeometryPlan::Instance& instance : source.instances) {
+      if (chosen[instance.geometry]) some.instances.push_back(instance);
+    }
+    if (!some.instances.empty()) part.sources.push_back(std::move(some));
+  }
+  return part;
+}
+
+util::Result<SceneChanges> replace_geometry(const gltf::Document& document,
+                                            const GeometryPlan& part, const Pose& pose,
+                                            const std::vector<glm::dmat4>& worlds, Scene& scene,
+                                            Winding& winding) {
+  SceneChanges changes;
+  if (part.sources.empty()) return changes;
+  Placer placer(document, part, pose, worlds, arrays_of(scene, winding));
+  if (auto ok = placer.place(); !ok) return ok.error();
+  scene.bounds = bounds_of(scene.positions);
+  changes.positions = true;
+  changes.triangles = placer.wound_otherwise();
+  for (const GeometryPlan::Source& source : part.sources) {
+    const kernels::Geometry& geometry = part.geometries[source.instances.front().geometry];
+    changes.normals |= geometry.normals != kernels::kNone;
+    changes.tangents |= geometry.tangents != kernels::kNone;
+    if (!morphs_plain_attributes(document.model.meshes[source.mesh].primitives[source.primitive])) {
+      continue;
+    }
+    changes.uvs |= geometry.uv0 != kernels::kNone || geometry.uv1 != kernels::kNone;
+    changes.colors |= geometry.colors != kernels::kNone;
+  }
+  return changes;
+}
+
+util::Result<void> replace_positions(const gltf::Document& document, const GeometryPlan& part,
+                                     const Pose& pose, const std::vector<glm::dmat4>& worlds,
+                                     std::vector<kernels::Vec3>& positions) {
+  Arrays to;
+  to.positions = positions;
+  return Placer(document, part, pose, worlds, to).place();
 }
 
 }  // namespace octrace::scene
