@@ -20,8 +20,9 @@ enum class Aov : int {
   material_id,       // uint32: material index + 1; 0
   primitive_id,      // uint32: triangle index + 1; 0
   mask,              // 1: 1 where something is hit, else 0
+  motion,            // 2: to the next frame, pixels, +x right, +y down; 0
 };
-inline constexpr int kAovCount = 13;
+inline constexpr int kAovCount = 14;
 
 // float or uint32 values, channels interleaved, rows from the top; null: not asked for.
 struct FramebufferView {

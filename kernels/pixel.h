@@ -4,6 +4,7 @@
 
 #include "kernels/aov.h"
 #include "kernels/camera.h"
+#include "kernels/motion.h"
 #include "kernels/path.h"
 
 namespace octrace::kernels {
@@ -73,11 +74,12 @@ OCTRACE_HD inline void store_hit(const SceneView& scene, const Ray& ray, const H
 }
 
 // All planes but beauty, of the pixel's centre. Surfaces with alpha mode BLEND count as solid,
-// because a pixel has one depth.
-template <class Tracer>
+// because a pixel has one depth. `motion`: NoMotion or MotionPlane.
+template <class Tracer, class Motion = NoMotion>
 OCTRACE_HD TraceStatus trace_geometry(const SceneView& scene, const RayCamera& camera,
                                       const RenderParams& params, const FramebufferView& to,
-                                      std::uint32_t x, std::uint32_t y, const Tracer& tracer) {
+                                      std::uint32_t x, std::uint32_t y, const Tracer& tracer,
+                                      const Motion& motion = {}) {
   const Ray ray = camera_ray(camera, static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f);
   Hit hit;
   const TraceStatus status = tracer.closest(scene, params, ray, &hit);
@@ -88,6 +90,7 @@ OCTRACE_HD TraceStatus trace_geometry(const SceneView& scene, const RayCamera& c
   } else {
     store_background(to, pixel);
   }
+  motion(scene, hit, to, pixel);
   return TraceStatus::ok;
 }
 

@@ -7,6 +7,7 @@
 
 #include "backend/app/command.h"
 #include "backend/app/options.h"
+#include "backend/app/time_options.h"
 #include "backend/batch/camera_choice.h"
 #include "backend/scene/builtin.h"
 #include "backend/util/log.h"
@@ -23,6 +24,7 @@ enum class Target { povray, blender, gltf };
 
 struct ExportOptions {
   SceneRequest scene;
+  TimeOptions time;
   Target target = Target::gltf;
   std::string folder;
   std::string camera;
@@ -43,6 +45,7 @@ constexpr const char* kHelp = R"(Examples:
   octrace export scene.glb --to povray --mode scene -o out     a picture with materials and lights
   octrace export scene.glb --to blender --camera ALL -o out    one script for all of its cameras
   octrace export builtin:default --to gltf -o out              every transform and pose baked in
+  octrace export scene.glb --to gltf --frame 12 -o out         the pose of an animation's frame 12
 
 The files' paths and the command that renders them are printed. What the other program cannot show
 as octrace does is said in warnings.)";
@@ -110,18 +113,24 @@ util::Result<std::string> export_gltf(const ExportOptions& options, const scene:
   return path;
 }
 
+// Whether Blender is given the flattened scene. At a time it must be: its importer keeps the keys
+// of an animation but not what glTF has between them.
+bool is_baked(const ExportOptions& options) {
+  return options.scene.source.starts_with(scene::kBuiltinPrefix) || options.time.time();
+}
+
 util::Result<void> export_blender(const ExportOptions& options, const scene::Scene& scene,
                                   const std::vector<NamedCamera>& cameras) {
   exporters::BlenderScene job;
-  job.gltf_scene = options.scene.scene;
   job.cull = options.povray.cull;
   job.alpha = options.povray.alpha;
-  if (options.scene.source.starts_with(scene::kBuiltinPrefix)) {
-    // There is no original to import: Blender reads what octrace writes.
+  if (is_baked(options)) {
+    // There is no original to import, or not at this time: Blender reads what octrace writes.
     const auto path = export_gltf(options, scene);
     if (!path) return path.error();
     job.file = exporters::path_parts(*path).name;
   } else {
+    job.gltf_scene = options.scene.scene;
     job.file = std::filesystem::absolute(options.scene.source).lexically_normal().string();
   }
   for (const NamedCamera& named : cameras) {
@@ -150,8 +159,8 @@ util::Result<util::Exit> run_export(ExportOptions options) {
   options.scene.need_textures =
       options.target == Target::gltf ||
       (options.target == Target::povray && options.povray.mode == exporters::PovrayMode::scene) ||
-      (options.target == Target::blender &&
-       options.scene.source.starts_with(scene::kBuiltinPrefix));
+      (options.target == Target::blender && is_baked(options));
+  set_time(options.time, options.scene);
   const auto session = open_scene(options.scene);
   if (!session) return session.error();
   const scene::Scene& scene = (*session)->scene;
@@ -185,6 +194,7 @@ void declare_export(CLI::App& program, Run& chosen) {
       "export", "write a scene for POV-Ray or Blender, or flattened as one .glb");
   command->footer(kHelp);
   add_scene_options(*command, options->scene);
+  add_time_options(*command, options->time);
   command->add_option("--to", options->target, "the program or format to write for")
       ->required()
       ->transform(CLI::CheckedTransformer(std::map<std::string, Target>{

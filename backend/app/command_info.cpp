@@ -6,6 +6,7 @@
 #include "backend/app/command.h"
 #include "backend/app/info_report.h"
 #include "backend/app/options.h"
+#include "backend/app/time_options.h"
 
 namespace octrace::app {
 
@@ -13,6 +14,7 @@ namespace {
 
 struct InfoOptions {
   SceneRequest scene;
+  TimeOptions time;
   bool json = false;
 };
 
@@ -22,6 +24,7 @@ constexpr const char* kHelp = R"(Examples:
 
 util::Result<util::Exit> run_info(InfoOptions options) {
   options.scene.collect_info = true;
+  set_time(options.time, options.scene);
   // Nothing here depends on pixels, and the image library takes longer to load than most scenes.
   options.scene.decode_images = false;
   options.scene.need_textures = false;
@@ -42,6 +45,7 @@ void declare_info(CLI::App& program, Run& chosen) {
       program.add_subcommand("info", "say what a scene contains and how its octree turns out");
   command->footer(kHelp);
   add_scene_options(*command, options->scene);
+  add_time_options(*command, options->time);
   command->add_flag("--json", options->json, "print JSON, with the same content");
   add_verbosity_options(*command);
   command->callback([options, &chosen] { chosen = [options] { return run_info(*options); }; });

@@ -10,6 +10,7 @@
 #include "backend/app/preload.h"
 #include "backend/app/progress.h"
 #include "backend/app/render_stats.h"
+#include "backend/app/time_options.h"
 #include "backend/batch/camera_choice.h"
 #include "backend/batch/output.h"
 #include "backend/image/image.h"
@@ -28,6 +29,7 @@ using batch::Output;
 
 struct RenderOptions {
   SceneRequest scene;
+  TimeOptions time;
   std::vector<std::string> outputs;
   std::optional<std::string> aovs;
   std::string camera, size = "1280x720", sky, stats;
@@ -56,6 +58,7 @@ file: {"type": "perspective", "yfov": 0.7, "matrix": [16 numbers, camera to worl
 Examples:
   octrace render builtin:default -o picture.png
   octrace render scene.glb -o frame.exr --aov beauty,Z,N,mask --spp 64 --size 1920x1080
+  octrace render scene.glb -o walk.exr --animation walk --frame 12 --fps 30 --aov Z,mask,motion
   octrace render scene.glb -o depth.png:Z -o mask.png:mask --camera 0 --stats stats.json)";
 
 void declare_view(CLI::App& command, RenderOptions& options) {
@@ -216,6 +219,10 @@ util::Result<Plan> make_plan(RenderOptions& options) {
 util::Result<render::TraceStats> trace(const RenderOptions& options, const SceneSession& session,
                                        const scene::Camera& camera, Progress& progress,
                                        render::Framebuffer& framebuffer) {
+  const auto rays = [&](const scene::Camera& at) {
+    return scene::make_ray_camera(at, static_cast<int>(framebuffer.width()),
+                                  static_cast<int>(framebuffer.height()));
+  };
   const std::unique_ptr<render::Renderer> renderer =
       render::make_renderer(session.scene, session.octree, options.device_choice);
   render::Settings settings;
@@ -224,9 +231,13 @@ util::Result<render::TraceStats> trace(const RenderOptions& options, const Scene
   settings.tile = options.tile;
   settings.progress = [&](double share) { progress.update(share); };
   settings.cancel = &util::interrupt_flag();
-  return renderer->render(scene::make_ray_camera(camera, static_cast<int>(framebuffer.width()),
-                                                 static_cast<int>(framebuffer.height())),
-                          settings, framebuffer);
+  util::Result<scene::Moment> next = scene::Moment{};
+  if (framebuffer.aovs().test(static_cast<std::size_t>(kernels::Aov::motion))) {
+    next = session.at(options.time.next());
+    if (!next) return next.error();
+    settings.next = {next->positions, rays(scene::camera_at(camera, session.scene, *next))};
+  }
+  return renderer->render(rays(camera), settings, framebuffer);
 }
 
 util::Result<void> write_outputs(const RenderOptions& options, const Plan& plan,
@@ -255,6 +266,9 @@ util::Result<util::Exit> run_render(RenderOptions options) {
 
   progress.stage("load");
   options.scene.need_textures = batch::needs_textures(plan->aovs);
+  set_time(options.time, options.scene);
+  options.scene.moving =
+      options.scene.time && plan->aovs.test(static_cast<std::size_t>(kernels::Aov::motion));
   util::Result<std::unique_ptr<SceneSession>> session = open_scene(options.scene);
   if (!session) return session.error();
   const double aspect =
@@ -303,6 +317,7 @@ void declare_render(CLI::App& program, Run& chosen) {
   CLI::App* command = program.add_subcommand("render", "render one view of a scene to image files");
   command->footer(kHelp);
   add_scene_options(*command, options->scene);
+  add_time_options(*command, options->time);
   declare_view(*command, *options);
   declare_running(*command, *options);
   add_verbosity_options(*command);

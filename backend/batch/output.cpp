@@ -34,7 +34,7 @@ bool holds_many(FileKind kind) { return kind == FileKind::exr || kind == FileKin
 
 bool is_array(FileKind kind) { return kind == FileKind::npy || kind == FileKind::npz; }
 
-// Nothing for positions, whose values no integer format holds.
+// Nothing for positions and motion, whose values no integer format holds.
 std::optional<image::Encoding> encoding_of(Aov aov) {
   switch (aov) {
     case Aov::beauty:
@@ -55,6 +55,7 @@ std::optional<image::Encoding> encoding_of(Aov aov) {
     case Aov::primitive_id:
       return image::Encoding::index16;
     case Aov::position:
+    case Aov::motion:
       break;
   }
   return std::nullopt;

@@ -63,6 +63,13 @@ constexpr std::array<AovInfo, kernels::kAovCount> kTable = {{
      true,
      "triangle index + 1"},
     {Aov::mask, "mask", "silhouette", {"mask"}, 1, false, "1 where something is hit"},
+    {Aov::motion,
+     "motion",
+     "motion",
+     {"motion.X", "motion.Y"},
+     2,
+     false,
+     "to the next frame, pixels, +X right, +Y down"},
 }};
 
 bool equal_ignoring_case(std::string_view a, std::string_view b) {

@@ -40,6 +40,7 @@ struct View {
   const kernels::RenderParams& params;
   kernels::FramebufferView target;
   bool geometry, beauty;
+  const kernels::MotionView* motion;  // null: no motion plane
 };
 
 struct TileCounts {
@@ -52,7 +53,10 @@ TraceStatus trace_pixel(const View& view, const kernels::CpuTracer& tracer, std:
   if (view.geometry) {
     ++counts->camera;
     const TraceStatus status =
-        trace_geometry(view.scene, view.camera, view.params, view.target, x, y, tracer);
+        view.motion == nullptr
+            ? trace_geometry(view.scene, view.camera, view.params, view.target, x, y, tracer)
+            : trace_geometry(view.scene, view.camera, view.params, view.target, x, y, tracer,
+                             kernels::MotionPlane{*view.motion});
     if (status != TraceStatus::ok) return status;
   }
   if (!view.beauty) return TraceStatus::ok;
@@ -107,7 +111,16 @@ util::Result<TraceStats> CpuRenderer::render(const kernels::RayCamera& camera,
     return util::Error{util::Exit::usage, "", "beauty needs at least one sample a pixel (--spp)",
                        "", ""};
   }
-  const View view{scene_, camera, settings.params, framebuffer.view(), geometry.any(), beauty};
+  const bool wants_motion = geometry.test(static_cast<std::size_t>(Aov::motion));
+  const kernels::MotionView motion =
+      settings.next ? make_motion_view(camera, *settings.next) : kernels::MotionView{};
+  const View view{scene_,
+                  camera,
+                  settings.params,
+                  framebuffer.view(),
+                  geometry.any(),
+                  beauty,
+                  wants_motion ? &motion : nullptr};
 
   TraceStats stats;
   TileFailure failure;

@@ -99,6 +99,23 @@ util::Result<void> CudaRenderer::refresh(const scene::SceneChanges& changes) {
   return {};
 }
 
+util::Result<kernels::MotionView> CudaRenderer::upload_motion(const kernels::RayCamera& camera,
+                                                              const NextFrame& next) {
+  kernels::MotionView motion = make_motion_view(camera, next);
+  const std::uint64_t bytes = next.positions.size_bytes();
+  if (bytes == 0) return motion;
+  Status status = next_positions_.reserve(bytes);
+  if (status.out_of_memory()) return memory_error("the next frame", bytes, device_);
+  if (status.ok()) {
+    status = kernels::cuda::copy_to_device(next_positions_.data(), next.positions.data(), bytes,
+                                           nullptr);
+  }
+  if (status.ok()) status = kernels::cuda::synchronize(nullptr);
+  if (!status.ok()) return cuda_error(status);
+  motion.next_positions.data = static_cast<const kernels::Vec3*>(next_positions_.data());
+  return motion;
+}
+
 Status CudaRenderer::prepare(std::uint64_t row_bytes, std::uint32_t rows) {
   for (Band& band : bands_) {
     if (Status s = band.planes.reserve(row_bytes * rows); !s.ok()) return s;
@@ -190,8 +207,19 @@ util::Result<TraceStats> CudaRenderer::render(const kernels::RayCamera& camera,
   if (Status s = kernels::cuda::select_device(device_); !s.ok()) return cuda_error(s);
   const util::Result<std::uint32_t> rows = choose_rows(framebuffer);
   if (!rows) return rows.error();
-  const kernels::cuda::View view{scene_.view(),  camera, settings.params, {},
-                                 geometry.any(), beauty};
+  kernels::cuda::View view{scene_.view(),
+                           camera,
+                           settings.params,
+                           {},
+                           geometry.any(),
+                           beauty,
+                           geometry.test(static_cast<std::size_t>(Aov::motion)),
+                           {}};
+  if (view.has_motion && settings.next) {
+    const util::Result<kernels::MotionView> motion = upload_motion(camera, *settings.next);
+    if (!motion) return motion.error();
+    view.motion = *motion;
+  }
   TraceStats stats;
   util::Result<void> result;
   std::size_t turn = 0;

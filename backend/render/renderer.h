@@ -4,10 +4,12 @@
 #include <atomic>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "backend/octree/octree.h"
 #include "backend/render/framebuffer.h"
+#include "backend/render/motion.h"
 #include "backend/scene/scene.h"
 #include "backend/scene/scene_changes.h"
 #include "kernels/camera.h"
@@ -22,6 +24,7 @@ struct Settings {
   // Called now and then from one thread at a time with the share of pixels done, 0 to 1.
   std::function<void(double)> progress;
   const std::atomic<bool>* cancel = nullptr;
+  std::optional<NextFrame> next;  // for the motion plane, which is 0 without it
 };
 
 struct TraceStats {

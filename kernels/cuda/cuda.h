@@ -6,6 +6,7 @@
 
 #include "kernels/aov.h"
 #include "kernels/camera.h"
+#include "kernels/motion.h"
 #include "kernels/ray.h"
 #include "kernels/render_params.h"
 #include "kernels/scene_view.h"
@@ -73,6 +74,8 @@ struct View {
   RenderParams params;
   FramebufferView target;
   bool geometry, beauty;
+  bool has_motion;  // target has the plane, and geometry is set
+  MotionView motion;
 };
 Status launch_view(const View& view, Report* report, Stream stream);
 

@@ -18,12 +18,18 @@ __device__ bool pixel_of_thread(const View& view, std::uint32_t* x, std::uint32_
   return *x < view.target.width && row < view.target.height;
 }
 
+template <bool kMotion>
 __global__ void __launch_bounds__(kBlockWidth* kBlockHeight)
     geometry_kernel(const __grid_constant__ View view, Report* report) {
   std::uint32_t x, y;
   if (!pixel_of_thread(view, &x, &y)) return;
-  const TraceStatus status =
-      trace_geometry(view.scene, view.camera, view.params, view.target, x, y, Tracer{});
+  TraceStatus status;
+  if constexpr (kMotion) {
+    status = trace_geometry(view.scene, view.camera, view.params, view.target, x, y, Tracer{},
+                            MotionPlane{view.motion});
+  } else {
+    status = trace_geometry(view.scene, view.camera, view.params, view.target, x, y, Tracer{});
+  }
   if (status != TraceStatus::ok) report_failure(report, status, x, y);
 }
 
@@ -57,7 +63,11 @@ Status launch_view(const View& view, Report* report, Stream stream) {
                   (view.target.height + kBlockHeight - 1) / kBlockHeight);
   const auto on = static_cast<cudaStream_t>(stream);
   if (view.geometry) {
-    geometry_kernel<<<grid, block, 0, on>>>(view, report);
+    if (view.has_motion) {
+      geometry_kernel<true><<<grid, block, 0, on>>>(view, report);
+    } else {
+      geometry_kernel<false><<<grid, block, 0, on>>>(view, report);
+    }
     if (Status s = launch_status("launching the geometry kernel"); !s.ok()) return s;
   }
   if (view.beauty) {

@@ -23,7 +23,7 @@ TEST(Aovs, TableIsInOrderAndChannelsAreUnique) {
     }
   }
   EXPECT_EQ(index, kernels::kAovCount);
-  EXPECT_EQ(channels.size(), 26u);
+  EXPECT_EQ(channels.size(), 28u);
 }
 
 TEST(Aovs, ParsesNamesAliasesAndAll) {
