@@ -66,7 +66,7 @@ TEST(Output, OneExrHoldsEveryPlane) {
               UnorderedElementsAre("R", "G", "B", "A", "Z", "distance", "N.X", "N.Y", "N.Z", "Ng.X",
                                    "Ng.Y", "Ng.Z", "P.X", "P.Y", "P.Z", "albedo.R", "albedo.G",
                                    "albedo.B", "uv.X", "uv.Y", "bary.X", "bary.Y", "object_id",
-                                   "material_id", "primitive_id", "mask"));
+                                   "material_id", "primitive_id", "mask", "motion.X", "motion.Y"));
   for (const image::Image::Plane& plane : image.planes) {
     EXPECT_EQ(plane.type == image::SampleType::uint32, plane.name.ends_with("_id")) << plane.name;
   }

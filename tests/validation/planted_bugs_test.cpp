@@ -163,7 +163,7 @@ class PlantedBugs : public testing::Test {
     app::SceneRequest request;
     request.source = scratch_->file("scene.gltf");
     EXPECT_TRUE(util::write_file(request.source, file.dump()));
-    auto session = app::open_scene(request);
+    auto session = batch::open_scene(request);
     EXPECT_TRUE(session) << (session ? "" : session.error().to_string());
     return session ? std::move(*session) : nullptr;
   }
