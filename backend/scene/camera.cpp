@@ -4,6 +4,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
+#include "backend/scene/camera_frame.h"
 #include "backend/scene/scene.h"
 
 namespace octrace::scene {
@@ -29,15 +30,10 @@ dvec3 any_perpendicular(const dvec3& unit) {
   return unit_or_zero(helper - glm::dot(helper, unit) * unit);
 }
 
-struct Frame {
-  dvec3 right, up, back, eye;
-};
+}  // namespace
 
-// Gram-Schmidt from the viewing axis on, so that what the camera looks at never changes. A mirrored
-// matrix keeps its mirrored image, as in a rasteriser; a degenerate one gets any perpendicular axis
-// in place of a column that vanishes.
-Frame orthonormal(const glm::dmat4& matrix) {
-  Frame frame;
+CameraFrame orthonormal_frame(const glm::dmat4& matrix) {
+  CameraFrame frame;
   frame.back = unit_or_zero(dvec3(matrix[2]));
   if (frame.back == dvec3(0.0)) {
     frame.back = unit_or_zero(glm::cross(dvec3(matrix[0]), dvec3(matrix[1])));
@@ -60,10 +56,8 @@ Frame orthonormal(const glm::dmat4& matrix) {
   return frame;
 }
 
-}  // namespace
-
 kernels::RayCamera make_ray_camera(const Camera& camera, int width, int height) {
-  const Frame frame = orthonormal(camera.matrix);
+  const CameraFrame frame = orthonormal_frame(camera.matrix);
   const double w = width, h = height;
   const dvec3 forward = -frame.back;
 

@@ -120,6 +120,8 @@ util::Result<Scene> place_scene(const gltf::Document& document, const ScenePlan&
   scene.object_names.reserve(model.nodes.size());
   for (std::size_t i = 0; i < model.nodes.size(); ++i) {
     scene.object_names.push_back(name_of(model.nodes, i, "node"));
+    const int mesh = model.nodes[i].mesh;
+    scene.object_meshes.push_back(mesh < 0 ? "" : name_of(model.meshes, mesh, "mesh"));
   }
   return scene;
 }

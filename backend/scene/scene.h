@@ -36,6 +36,7 @@ struct Scene {
 
   std::vector<Camera> cameras;              // placed in the world, in node order
   std::vector<std::string> object_names;    // by object index (glTF node index)
+  std::vector<std::string> object_meshes;   // by object index; empty: the object has no mesh
   std::vector<std::string> material_names;  // by material index
   Bounds bounds;
   std::vector<std::string> warnings;  // one line each, no duplicates

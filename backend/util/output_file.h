@@ -22,12 +22,13 @@ class OutputFile {
   // Overwrites bytes that were appended before: a length that is known only afterwards.
   Result<void> patch(std::uint64_t offset, std::string_view bytes);
   std::uint64_t size() const { return written_ + buffer_.size(); }
+  Result<void> flush();  // the buffer into the temporary file, where others may read it
+  const std::string& temporary() const { return file_.temporary(); }
   Result<void> commit();
 
  private:
   OutputFile(AtomicFile file, std::string target, int descriptor)
       : file_(std::move(file)), target_(std::move(target)), descriptor_(descriptor) {}
-  Result<void> flush();
   Result<void> write_at(std::uint64_t offset, std::string_view bytes);
 
   AtomicFile file_;
