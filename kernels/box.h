@@ -47,27 +47,23 @@ OCTRACE_HD OCTRACE_FORCE_INLINE SlabRay make_slab_ray(const Ray& ray) {
 }
 
 OCTRACE_HD OCTRACE_FORCE_INLINE Interval slab_axis(float lower, float upper, float padding,
-                                                   float inverse, bool negative) {
+                                                   float inverse) {
   const float a = mul_rn(sub_rn(lower, padding), inverse);
   const float b = mul_rn(add_rn(upper, padding), inverse);
-  return negative ? Interval{b, a} : Interval{a, b};
+  return {least(a, b), most(a, b)};
 }
 
-// Where along the ray the box lies, never too narrow.
+// Where along the ray the box lies, never too narrow. Its corners are relative to the ray's origin.
 OCTRACE_HD OCTRACE_FORCE_INLINE Interval slab(const Vec3& lower, const Vec3& upper,
-                                              const SlabRay& ray) {
-  const Vec3 l(sub_rn(lower.x, ray.origin.x), sub_rn(lower.y, ray.origin.y),
-               sub_rn(lower.z, ray.origin.z));
-  const Vec3 u(sub_rn(upper.x, ray.origin.x), sub_rn(upper.y, ray.origin.y),
-               sub_rn(upper.z, ray.origin.z));
-  const float mx = greater(abs_of(l.x), abs_of(u.x));
-  const float my = greater(abs_of(l.y), abs_of(u.y));
-  const float mz = greater(abs_of(l.z), abs_of(u.z));
-  const float padding = mul_rn(greater(greater(mx, my), mz), kBoxPadding);
-  const Interval x = slab_axis(l.x, u.x, padding, ray.inverse.x, ray.octant & 1);
-  const Interval y = slab_axis(l.y, u.y, padding, ray.inverse.y, ray.octant & 2);
-  const Interval z = slab_axis(l.z, u.z, padding, ray.inverse.z, ray.octant & 4);
-  return {greater(greater(x.near, y.near), z.near), lesser(lesser(x.far, y.far), z.far)};
+                                              const Vec3& inverse) {
+  const float mx = most(abs_of(lower.x), abs_of(upper.x));
+  const float my = most(abs_of(lower.y), abs_of(upper.y));
+  const float mz = most(abs_of(lower.z), abs_of(upper.z));
+  const float padding = mul_rn(most(most(mx, my), mz), kBoxPadding);
+  const Interval x = slab_axis(lower.x, upper.x, padding, inverse.x);
+  const Interval y = slab_axis(lower.y, upper.y, padding, inverse.y);
+  const Interval z = slab_axis(lower.z, upper.z, padding, inverse.z);
+  return {most(most(x.near, y.near), z.near), least(least(x.far, y.far), z.far)};
 }
 
 // A node's frame in the ray's terms: a child's plane q along axis a lies at t = q * step[a] +

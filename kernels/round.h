@@ -32,6 +32,15 @@ OCTRACE_HD OCTRACE_FORCE_INLINE double mul_rn(double a, double b) { return a * b
 
 OCTRACE_HD OCTRACE_FORCE_INLINE float lesser(float a, float b) { return a < b ? a : b; }
 OCTRACE_HD OCTRACE_FORCE_INLINE float greater(float a, float b) { return a > b ? a : b; }
-OCTRACE_HD OCTRACE_FORCE_INLINE float abs_of(float a) { return a < 0.0f ? -a : a; }
+// The same for numbers, in one instruction everywhere; which of +0 and -0 is the lesser is left
+// open.
+#if defined(__CUDA_ARCH__)
+OCTRACE_HD OCTRACE_FORCE_INLINE float least(float a, float b) { return fminf(a, b); }
+OCTRACE_HD OCTRACE_FORCE_INLINE float most(float a, float b) { return fmaxf(a, b); }
+#else
+OCTRACE_HD OCTRACE_FORCE_INLINE float least(float a, float b) { return lesser(a, b); }
+OCTRACE_HD OCTRACE_FORCE_INLINE float most(float a, float b) { return greater(a, b); }
+#endif
+OCTRACE_HD OCTRACE_FORCE_INLINE float abs_of(float a) { return __builtin_fabsf(a); }
 
 }  // namespace octrace::kernels

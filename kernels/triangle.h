@@ -104,8 +104,8 @@ OCTRACE_HD OCTRACE_FORCE_INLINE bool intersect_triangle(const SlabRay& slab_ray,
   if (any_negative && (any_positive || cull_back)) return false;
   float determinant = add_rn(add_rn(wa, wb), wc);
   if (determinant == 0.0f) return false;
-  const float widest = greater(greater(abs_of(ax), abs_of(bx)), abs_of(cx));
-  const float highest = greater(greater(abs_of(ay), abs_of(by)), abs_of(cy));
+  const float widest = most(most(abs_of(ax), abs_of(bx)), abs_of(cx));
+  const float highest = most(most(abs_of(ay), abs_of(by)), abs_of(cy));
   if (abs_of(determinant) < mul_rn(mul_rn(widest, highest), kThinTriangle)) {
     wa = exact_edge(cx, cy, bx, by);
     wb = exact_edge(ax, ay, cx, cy);
@@ -116,13 +116,16 @@ OCTRACE_HD OCTRACE_FORCE_INLINE bool intersect_triangle(const SlabRay& slab_ray,
   const float scaled =
       add_rn(add_rn(mul_rn(wa, shear(ray.row_z, ra)), mul_rn(wb, shear(ray.row_z, rb))),
              mul_rn(wc, shear(ray.row_z, rc)));
-  const Vec3 lower(lesser(lesser(a.x, b.x), c.x), lesser(lesser(a.y, b.y), c.y),
-                   lesser(lesser(a.z, b.z), c.z));
-  const Vec3 upper(greater(greater(a.x, b.x), c.x), greater(greater(a.y, b.y), c.y),
-                   greater(greater(a.z, b.z), c.z));
-  const Interval interval = slab(lower, upper, slab_ray);
+  // Rounding is monotone, so these are the bounds of a, b and c, moved to the origin.
+  const Vec3 lower(least(least(ra.x, rb.x), rc.x), least(least(ra.y, rb.y), rc.y),
+                   least(least(ra.z, rb.z), rc.z));
+  const Vec3 upper(most(most(ra.x, rb.x), rc.x), most(most(ra.y, rb.y), rc.y),
+                   most(most(ra.z, rb.z), rc.z));
+  const Interval interval = slab(lower, upper, slab_ray.inverse);
   if (!(interval.near <= interval.far)) return false;
-  const float t = lesser(greater(div_rn(scaled, determinant), interval.near), interval.far);
+  // The sum makes a zero positive, whatever the signs of zero above.
+  const float t =
+      add_rn(least(most(div_rn(scaled, determinant), interval.near), interval.far), 0.0f);
   if (!(t >= tmin && t <= tmax)) return false;
   *hit = {t, div_rn(wb, determinant), div_rn(wc, determinant)};
   return true;

@@ -3,100 +3,45 @@
 // and Laine 2009, "Understanding the efficiency of ray traversal on GPUs"; dynamic fetch as in
 // Ylitie, Karras and Laine 2017).
 #include "kernels/cuda/status.h"
-#include "kernels/cuda/tracer.h"
+#include "kernels/cuda/warp_tracer.h"
 
 namespace octrace::kernels::cuda {
 
 namespace {
 
-constexpr unsigned kBlock = 64;
-constexpr unsigned kWarp = 32;
-constexpr unsigned kAllLanes = 0xffffffffu;
+constexpr unsigned kBlock = 128;
+constexpr unsigned kBlocks = 7;  // a multiprocessor holds
 // Live lanes below which a warp refills.
 constexpr int kRefillBelow = 20;
 
-struct RayJob {
+struct RayBuffer {
+  static constexpr bool kAlpha = false;
   const Ray* rays;
   Hit* hits;
-  std::uint64_t count;
-};
+  std::uint64_t size;
 
-// What a lane carries for its ray. Leaf functors refer to parts of it, so they are made for each
-// use.
-template <bool kAnyHit>
-struct Lane {
-  Walk walk;
-  TriangleRay triangle_ray;
-  Hit hit;
-  std::uint64_t index;
-
-  __device__ bool test(const SceneView& scene, const RenderParams& params) {
-    const std::uint32_t triangle = walk.next_triangle();
-    if constexpr (kAnyHit) {
-      TransmittanceLeaf leaf{scene, params, walk.ray, triangle_ray, walk.tmin, 0u};
-      const bool blocked = leaf(triangle, walk.tmax);
-      if (blocked) hit.triangle = 0;
-      return blocked;
-    } else {
-      ClosestLeaf leaf{scene, params, walk.ray, triangle_ray, walk.tmin, hit};
-      leaf(triangle, walk.tmax);
-      hit = leaf.hit;
-      return false;
-    }
+  __device__ std::uint64_t count() const { return size; }
+  __device__ Ray load(std::uint64_t index) const {
+    const float4* p = reinterpret_cast<const float4*>(rays + index);
+    const float4 a = __ldg(p), b = __ldg(p + 1);
+    return {Vec3(a.x, a.y, a.z), a.w, Vec3(b.x, b.y, b.z), b.w};
+  }
+  __device__ void store(std::uint64_t index, const Hit& hit) const {
+    reinterpret_cast<float4*>(hits)[index] =
+        make_float4(hit.t, hit.u, hit.v, __uint_as_float(hit.triangle));
   }
 };
 
-// Hands out rays in the order of the buffer: one atomic for all idle lanes of a warp.
-__device__ std::uint64_t fetch(bool idle, unsigned long long* next) {
-  const unsigned idle_lanes = __ballot_sync(kAllLanes, idle);
-  const unsigned lane = threadIdx.x % kWarp;
-  unsigned long long first = 0;
-  const int leader = __ffs(static_cast<int>(idle_lanes)) - 1;
-  if (static_cast<int>(lane) == leader) first = atomicAdd(next, __popc(idle_lanes));
-  first = __shfl_sync(kAllLanes, first, leader);
-  return first + __popc(idle_lanes & ((1u << lane) - 1u));
-}
-
 template <bool kAnyHit>
-__global__ void __launch_bounds__(kBlock)
+__global__ void __launch_bounds__(kBlock, kBlocks)
     rays_kernel(const __grid_constant__ SceneView scene,
-                const __grid_constant__ RenderParams params, const RayJob job, Report* report) {
-  const Ray nothing{Vec3(0.0f), 0.0f, Vec3(0.0f, 0.0f, 1.0f), 0.0f};
-  Lane<kAnyHit> lane{Walk(scene.octree, nothing), make_triangle_ray(nothing.direction), {}, 0};
-  WalkStack stack;
-  bool live = false, more = true;
-  for (;;) {
-    if (more) {
-      const std::uint64_t index = fetch(!live, &report->next_ray);
-      if (!live && index < job.count) {
-        const Ray ray = job.rays[index];
-        lane.walk.restart(scene.octree, ray);
-        lane.triangle_ray = make_triangle_ray(ray.direction);
-        lane.hit = {ray.tmax, 0.0f, 0.0f, kNone};
-        lane.index = index;
-        live = true;
-      } else if (!live) {
-        more = false;
-      }
-      more = __all_sync(kAllLanes, more);
-    }
-    if (!__any_sync(kAllLanes, live)) return;
-    const int refill_below = more ? kRefillBelow : 1;
-    do {
-      if (live) {
-        live = lane.walk.next_node(scene.octree, SimtChildTest{}, stack);
-        while (live && lane.walk.triangles != 0) {
-          if (lane.test(scene, params)) live = false;
-        }
-        if (!live) {
-          job.hits[lane.index] = lane.hit;
-          if (lane.walk.status != TraceStatus::ok) {
-            report_failure(report, lane.walk.status, static_cast<std::uint32_t>(lane.index), 0);
-          }
-        }
-      }
-    } while (__popc(__ballot_sync(kAllLanes, live)) >= refill_below);
-  }
+                const __grid_constant__ RenderParams params, const RayBuffer rays, Report* report) {
+  __shared__ VisitOrder visit_order;
+  __shared__ WarpShared shared[kBlock / kWarp];
+  visit_order.fill();
+  __syncthreads();
+  trace_rays<kAnyHit, kRefillBelow>(scene, params, rays, shared[threadIdx.x / kWarp], visit_order,
+                                    report);
 }
 
 // As many blocks as the device holds at once.
@@ -118,16 +63,17 @@ Status resident_blocks(Kernel kernel, unsigned* blocks) {
 }
 
 template <bool kAnyHit>
-Status launch(const SceneView& scene, const RenderParams& params, const RayJob& job, Report* report,
-              cudaStream_t stream) {
+Status launch(const SceneView& scene, const RenderParams& params, const RayBuffer& rays,
+              Report* report, cudaStream_t stream) {
+  const auto kernel = rays_kernel<kAnyHit>;
   unsigned blocks = 0;
-  if (Status s = resident_blocks(rays_kernel<kAnyHit>, &blocks); !s.ok()) return s;
-  const std::uint64_t needed = (job.count + kBlock - 1) / kBlock;
+  if (Status s = resident_blocks(kernel, &blocks); !s.ok()) return s;
+  const std::uint64_t needed = (rays.size + kBlock - 1) / kBlock;
   if (needed < blocks) blocks = static_cast<unsigned>(needed);
   const cudaError_t cleared =
       cudaMemsetAsync(&report->next_ray, 0, sizeof report->next_ray, stream);
   if (cleared != cudaSuccess) return status_of(cleared, "clearing the ray counter");
-  rays_kernel<kAnyHit><<<blocks, kBlock, 0, stream>>>(scene, params, job, report);
+  kernel<<<blocks, kBlock, 0, stream>>>(scene, params, rays, report);
   return launch_status("launching the ray kernel");
 }
 
@@ -140,10 +86,10 @@ Status launch_rays(const OctreeView& octree, const RenderParams& params, const R
   scene.octree = octree;
   RenderParams geometry_only = params;
   geometry_only.alpha = 0;
-  const RayJob job{rays, hits, count};
+  const RayBuffer buffer{rays, hits, count};
   const auto on = static_cast<cudaStream_t>(stream);
-  return any_hit ? launch<true>(scene, geometry_only, job, report, on)
-                 : launch<false>(scene, geometry_only, job, report, on);
+  return any_hit ? launch<true>(scene, geometry_only, buffer, report, on)
+                 : launch<false>(scene, geometry_only, buffer, report, on);
 }
 
 Status time_rays(const OctreeView& octree, const RenderParams& params, const Ray* rays, Hit* hits,
