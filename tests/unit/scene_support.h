@@ -79,17 +79,22 @@ class GltfFile {
     return append("meshes", {{"primitives", json::array({primitive})}});
   }
 
-  util::Result<gltf::Document> load() const {
+  // The whole file, its buffer within.
+  std::string text() const {
     json file = root;
     if (!bytes_.empty()) {
       file["buffers"] =
           json::array({{{"byteLength", bytes_.size()},
                         {"uri", "data:application/octet-stream;base64," + base64(bytes_)}}});
     }
+    return file.dump(1);
+  }
+
+  util::Result<gltf::Document> load() const {
     const auto* test = ::testing::UnitTest::GetInstance()->current_test_info();
     const std::string path =
         ::testing::TempDir() + "octrace_" + test->test_suite_name() + "_" + test->name() + ".gltf";
-    std::ofstream(path) << file.dump(1);
+    std::ofstream(path) << text();
     auto document = gltf::load(path, {});
     std::filesystem::remove(path);
     return document;
