@@ -76,27 +76,26 @@ render::AovSet beauty_only() {
 
 util::Result<void> check_single_output(const Output& output, const ImageSize& size) {
   if (output.aovs.count() != 1) {
-    return usage_error(fmt::format("-o {}: this format holds one AOV, {} were named", output.path,
-                                   output.aovs.count()));
+    return usage_error(
+        fmt::format("this format holds one AOV, {} were named", output.aovs.count()));
   }
   if (output.kind == FileKind::npy) return {};
   const render::AovInfo& info = render::aov_info(only_aov(output.aovs));
   const std::optional<image::Encoding> encoding = encoding_of(info.aov);
   if (!encoding) {
-    return usage_error(
-        fmt::format("-o {}: {} needs floating point: use .exr or .npy", output.path, info.option));
+    return usage_error(fmt::format("{} needs floating point: use .exr or .npy", info.option));
   }
   const bool words =
       *encoding == image::Encoding::scaled16 || *encoding == image::Encoding::index16;
   if (output.kind == FileKind::jpeg && words) {
-    return usage_error(fmt::format("-o {}: {} needs 16 bits, a JPEG has 8: use .exr, .png or .tif",
-                                   output.path, info.option));
+    return usage_error(
+        fmt::format("{} needs 16 bits, a JPEG has 8: use .exr, .png or .tif", info.option));
   }
   const std::uint32_t longest = std::max(size.width, size.height);
   const std::uint32_t allowed = output.kind == FileKind::jpeg ? 65500 : 1000000;
   if (longest > allowed) {
-    return usage_error(fmt::format("-o {}: {}x{} pixels, this format takes {} a side: use .exr",
-                                   output.path, size.width, size.height, allowed));
+    return usage_error(fmt::format("{}x{} pixels, this format takes {} a side: use .exr",
+                                   size.width, size.height, allowed));
   }
   return {};
 }
@@ -117,22 +116,15 @@ Argument split_argument(const std::string& text) {
 util::Result<Output> plan_output(const std::string& argument, const render::AovSet& listed,
                                  const ImageSize& size) {
   const Argument split = split_argument(argument);
-  const std::optional<FileKind> kind = kind_of(split.path);
-  if (!kind) {
-    return usage_error(
-        fmt::format("-o {}: the name must end in .exr, .png, .tif, .jpg, .npy or .npz", argument));
-  }
-  Output output{split.path, *kind, listed};
+  std::optional<render::AovSet> named;
   if (split.aovs) {
-    util::Result<render::AovSet> named = render::parse_aovs(*split.aovs);
-    if (!named) return named.error();
-    output.aovs = *named;
-  } else if (!holds_many(*kind) && listed.count() != 1) {
-    output.aovs = beauty_only();
+    util::Result<render::AovSet> parsed = render::parse_aovs(*split.aovs);
+    if (!parsed) return parsed.error();
+    named = *parsed;
   }
-  if (!holds_many(*kind)) {
-    util::Result<void> checked = check_single_output(output, size);
-    if (!checked) return checked.error();
+  util::Result<Output> output = plan_file(split.path, named, listed, size);
+  if (!output) {
+    output.error().message = fmt::format("-o {}: {}", argument, output.error().message);
   }
   return output;
 }
@@ -154,6 +146,21 @@ void add_channels(const render::Framebuffer& framebuffer, Aov aov, image::ImageV
 
 util::Error usage_error(const std::string& message) {
   return {util::Exit::usage, "", message, "", ""};
+}
+
+util::Result<Output> plan_file(const std::string& path, const std::optional<render::AovSet>& named,
+                               const render::AovSet& listed, const ImageSize& size) {
+  const std::optional<FileKind> kind = kind_of(path);
+  if (!kind) {
+    return usage_error("the name must end in .exr, .png, .tif, .jpg, .npy or .npz");
+  }
+  Output output{path, *kind, named.value_or(listed)};
+  if (!named && !holds_many(*kind) && listed.count() != 1) output.aovs = beauty_only();
+  if (!holds_many(*kind)) {
+    util::Result<void> checked = check_single_output(output, size);
+    if (!checked) return checked.error();
+  }
+  return output;
 }
 
 util::Result<std::vector<Output>> plan_outputs(const std::vector<std::string>& arguments,

@@ -27,6 +27,11 @@ struct Output {
   render::AovSet aovs;  // one, but for an EXR or NPZ
 };
 
+// One file: the planes named for it, else those listed for all where its format holds them. The
+// error's message says what is wrong with the path, without the path.
+util::Result<Output> plan_file(const std::string& path, const std::optional<render::AovSet>& named,
+                               const render::AovSet& listed, const ImageSize& size);
+
 // The arguments of -o: PATH, or PATH:AOV[,AOV...]. The text after the last colon names AOVs when it
 // holds neither '.' nor '/'. An EXR or NPZ without names holds those of --aov (default beauty); a
 // PNG, TIFF, JPEG or NPY holds the one that --aov names, where that is one, else beauty. Usage

@@ -4,10 +4,12 @@
 #include <limits>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include <glm/mat4x4.hpp>
 #include <glm/vec3.hpp>
 
+#include "backend/util/limits.h"
 #include "backend/util/result.h"
 #include "kernels/camera.h"
 
@@ -41,6 +43,11 @@ kernels::RayCamera make_ray_camera(const Camera& camera, int width, int height);
 // "orthographic" with xmag and ymag, or "pinhole" with fx fy cx cy (width and height optional);
 // znear and zfar optional.
 util::Result<Camera> read_camera_file(const std::string& path);
+
+// A camera path: {"cameras": [...]} of what a camera file holds, or a camera file by itself. A
+// camera without a name is called after the file, and its number where there are several.
+util::Result<std::vector<Camera>> read_camera_path(const std::string& path,
+                                                   const util::Limits& limits);
 
 struct Bounds;
 // A camera at eye that looks at target, +Y up; the two must not lie above each other.

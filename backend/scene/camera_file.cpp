@@ -4,11 +4,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
+#include <filesystem>
 #include <initializer_list>
 #include <nlohmann/json.hpp>
 #include <string_view>
 
+#include "backend/gltf/files.h"
+#include "backend/gltf/issues.h"
+#include "backend/gltf/json_text.h"
 #include "backend/scene/camera.h"
 
 namespace octrace::scene {
@@ -22,11 +25,11 @@ constexpr double kPi = 3.141592653589793;
 
 class Reader {
  public:
-  Reader(std::string file, json object) : file_(std::move(file)), object_(std::move(object)) {}
+  Reader(std::string file, std::string at, json object)
+      : file_(std::move(file)), at_(std::move(at)), object_(std::move(object)) {}
 
-  util::Error error(std::string pointer, std::string code, std::string message) const {
-    return {util::Exit::invalid_input, std::move(code), std::move(message), file_,
-            std::move(pointer)};
+  util::Error error(const std::string& pointer, std::string code, std::string message) const {
+    return {util::Exit::invalid_input, std::move(code), std::move(message), file_, at_ + pointer};
   }
 
   bool has(const char* key) const { return object_.contains(key); }
@@ -80,7 +83,7 @@ class Reader {
     return pointer;
   }
 
-  std::string file_;
+  std::string file_, at_;  // at_: the object's own pointer in the file
   json object_;
 };
 
@@ -172,43 +175,30 @@ util::Result<void> read_lens(const Reader& reader, Camera& camera) {
   return reader.number("height", false, 0.0, false, &camera.height);
 }
 
-util::Result<json> parse(const std::string& path) {
-  const auto failed = [&](util::Exit exit, std::string code, std::string message) {
-    return util::Error{exit, std::move(code), std::move(message), path, ""};
-  };
-  std::ifstream stream(path, std::ios::binary);
-  if (!stream) return failed(util::Exit::io, "IO_ERROR", "cannot be opened");
-  std::string text(kMaxBytes + 1, '\0');
-  stream.read(text.data(), static_cast<std::streamsize>(text.size()));
-  if (stream.bad()) return failed(util::Exit::io, "IO_ERROR", "cannot be read");
-  text.resize(static_cast<std::size_t>(stream.gcount()));
-  if (text.size() > kMaxBytes) {
-    return failed(util::Exit::limit, "",
-                  fmt::format("is longer than a camera file may be, {} bytes", kMaxBytes));
+util::Result<json> parse(const std::string& path, const util::Limits& limits) {
+  auto bytes = gltf::read_regular_file(path, limits.max_file_bytes);
+  if (!bytes) {
+    bytes.error().file = path;
+    return bytes.error();
   }
-  try {
-    return json::parse(text);
-  } catch (const json::exception& exception) {
-    return failed(util::Exit::invalid_input, "INVALID_JSON", exception.what());
-  }
+  gltf::Issues issues(path);
+  json root = gltf::parse_json({reinterpret_cast<const char*>(bytes->data()), bytes->size()},
+                               limits, issues);
+  if (issues.failed()) return issues.take_error();
+  return root;
 }
 
-}  // namespace
-
-util::Result<Camera> read_camera_file(const std::string& path) {
-  auto parsed = parse(path);
-  if (!parsed) return parsed.error();
-  if (!parsed->is_object()) {
-    return util::Error{util::Exit::invalid_input, "TYPE_MISMATCH", "needs a JSON object", path, ""};
+util::Result<Camera> read_camera(const Reader& reader, const std::string& name) {
+  if (!reader.object().is_object()) {
+    return reader.error("", "TYPE_MISMATCH", "needs a JSON object");
   }
-  const Reader reader(path, std::move(*parsed));
   Camera camera;
-  camera.name = path;
-  if (const auto name = reader.object().find("name"); name != reader.object().end()) {
-    if (!name->is_string()) {
-      return reader.error("/name", "TYPE_MISMATCH", "needs a string, got " + name->dump());
+  camera.name = name;
+  if (const auto given = reader.object().find("name"); given != reader.object().end()) {
+    if (!given->is_string()) {
+      return reader.error("/name", "TYPE_MISMATCH", "needs a string, got " + given->dump());
     }
-    camera.name = name->get<std::string>();
+    camera.name = given->get<std::string>();
   }
   if (auto ok = read_lens(reader, camera); !ok) return ok.error();
   const auto matrix = read_matrix(reader);
@@ -222,6 +212,42 @@ util::Result<Camera> read_camera_file(const std::string& path) {
         fmt::format("needs more than znear, {}; got {}", camera.znear, camera.zfar));
   }
   return camera;
+}
+
+}  // namespace
+
+util::Result<Camera> read_camera_file(const std::string& path) {
+  util::Limits limits;
+  limits.max_file_bytes = limits.max_json_bytes = kMaxBytes;
+  auto parsed = parse(path, limits);
+  if (!parsed) return parsed.error();
+  return read_camera(Reader(path, "", std::move(*parsed)), path);
+}
+
+util::Result<std::vector<Camera>> read_camera_path(const std::string& path,
+                                                   const util::Limits& limits) {
+  auto parsed = parse(path, limits);
+  if (!parsed) return parsed.error();
+  const std::string name = std::filesystem::path(path).stem().string();
+  const auto list = parsed->find("cameras");
+  if (list == parsed->end()) {
+    auto camera = read_camera(Reader(path, "", std::move(*parsed)), name);
+    if (!camera) return camera.error();
+    return std::vector<Camera>{std::move(*camera)};
+  }
+  const Reader reader(path, "", *parsed);
+  if (auto ok = reader.only({"cameras"}); !ok) return ok.error();
+  if (!list->is_array() || list->empty()) {
+    return reader.error("/cameras", "TYPE_MISMATCH", "needs an array that is not empty");
+  }
+  std::vector<Camera> cameras;
+  for (std::size_t i = 0; i < list->size(); ++i) {
+    auto camera = read_camera(Reader(path, fmt::format("/cameras/{}", i), (*list)[i]),
+                              fmt::format("{}_{:03}", name, i));
+    if (!camera) return camera.error();
+    cameras.push_back(std::move(*camera));
+  }
+  return cameras;
 }
 
 }  // namespace octrace::scene

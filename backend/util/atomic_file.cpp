@@ -17,6 +17,9 @@ namespace octrace::util {
 
 namespace {
 
+// In the names of temporary files, so that what a killed run left behind can be told apart.
+constexpr std::string_view kMark = ".octrace-";
+
 Error io_error(const std::string& file, std::string_view what, int error_number) {
   return {Exit::io, "IO_ERROR", fmt::format("{}: {}", what, std::strerror(error_number)), file, ""};
 }
@@ -58,7 +61,8 @@ Result<AtomicFile> AtomicFile::create(const std::string& target) {
   // The leading dot hides it from patterns such as *.exr; mkstemps fills in the Xs.
   const std::string extension = path.extension().string();
   std::string temporary =
-      (path.parent_path() / fmt::format(".{}.XXXXXX{}", path.stem().string(), extension)).string();
+      (path.parent_path() / fmt::format(".{}{}XXXXXX{}", path.stem().string(), kMark, extension))
+          .string();
   const int descriptor = ::mkstemps(temporary.data(), static_cast<int>(extension.size()));
   if (descriptor < 0) return io_error(target, "cannot be created", errno);
   ::fchmod(descriptor, 0666 & ~process_umask());  // mkstemps makes 0600
@@ -94,6 +98,14 @@ Result<void> AtomicFile::commit() {
     ::close(folder_descriptor);
   }
   return {};
+}
+
+std::optional<std::string> target_of_temporary(std::string_view name) {
+  const std::size_t mark = name.rfind(kMark);
+  if (!name.starts_with('.') || mark == std::string_view::npos || mark == 0) return std::nullopt;
+  const std::string_view rest = name.substr(mark + kMark.size());
+  if (rest.size() < 6 || (rest.size() > 6 && rest[6] != '.')) return std::nullopt;
+  return std::string(name.substr(1, mark - 1)) + std::string(rest.substr(6));
 }
 
 Result<void> write_file(const std::string& target, std::string_view content) {

@@ -1,6 +1,7 @@
 // Output that is whole or absent: write to a temporary name beside the target, flush, rename.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -27,6 +28,10 @@ class AtomicFile {
       : target_(std::move(target)), temporary_(std::move(temporary)) {}
   std::string target_, temporary_;
 };
+
+// The file name whose temporary file, left behind by a killed process, is called `name`; nothing
+// where it is none. Names without folders.
+std::optional<std::string> target_of_temporary(std::string_view name);
 
 Result<void> write_file(const std::string& target, std::string_view content);
 

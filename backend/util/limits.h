@@ -16,6 +16,7 @@ struct Limits {
   std::uint64_t max_texture_pixels = 1ull << 28;  // --max-texture-pixels: one image, width * height
   std::uint64_t max_image_pixels = 1ull << 28;    // --max-image-pixels: the rendered image
   std::uint64_t max_spp = 1ull << 16;             // --max-spp
+  std::uint64_t max_views = 10'000'000;           // --max-views: of a batch, in all its shards
 };
 
 }  // namespace octrace::util

@@ -1,0 +1,223 @@
+#include "backend/batch/plan.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <map>
+#include <unordered_map>
+
+#include "backend/batch/camera_sets.h"
+#include "backend/batch/hash.h"
+#include "backend/batch/scene_probe.h"
+
+namespace octrace::batch {
+
+namespace {
+
+using util::Result;
+
+bool depends_on_scene(const CameraEntry& entry) {
+  if (std::holds_alternative<AllCameras>(entry)) return true;
+  const auto* named = std::get_if<NamedCamera>(&entry);
+  return named != nullptr && std::holds_alternative<std::int64_t>(named->which);
+}
+
+util::Error too_many_views(const Job& job, std::uint64_t most) {
+  return {util::Exit::limit, "",
+          fmt::format("makes more than the {} views that --max-views allows", most), job.file, ""};
+}
+
+// The longest folder that both lie in: a common start that ends in '/'.
+std::string common_folder(const std::string& a, const std::string& b) {
+  const auto end = std::mismatch(a.begin(), a.end(), b.begin(), b.end()).first;
+  const std::string start(a.begin(), end);
+  const std::size_t slash = start.rfind('/');
+  return slash == std::string::npos ? "" : start.substr(0, slash + 1);
+}
+
+}  // namespace
+
+Result<Plan> Plan::make(Job job, const std::string& base, const util::Limits& limits) {
+  Plan plan;
+  plan.job_ = std::move(job);
+  if (auto found = plan.find_cameras(limits); !found) return found.error();
+  for (const JobScene& scene : plan.job_.scenes) {
+    plan.scene_names_.push_back(path_name(scene.name));
+  }
+  const std::uint64_t frames = std::max<std::uint64_t>(1, plan.job_.frames.size());
+  plan.first_view_ = {0};
+  for (std::size_t i = 0; i < plan.job_.scenes.size(); ++i) {
+    const std::uint64_t cameras = plan.cameras_of(i).cameras.size();
+    const std::uint64_t left = limits.max_views - plan.first_view_.back();
+    if (cameras > left / frames) return too_many_views(plan.job_, limits.max_views);
+    plan.first_view_.push_back(plan.first_view_.back() + cameras * frames);
+  }
+  plan.choose_folder(base);
+  if (auto checked = plan.check_paths(); !checked) return checked.error();
+  return plan;
+}
+
+Result<void> Plan::find_cameras(const util::Limits& limits) {
+  const auto add = [](SceneCameras& to, std::size_t entry, std::uint64_t index, std::string name) {
+    to.cameras.push_back({entry, index});
+    to.path_names.push_back(path_name(name));
+    to.names.push_back(std::move(name));
+  };
+  const auto fill = [&](SceneCameras& to, const std::vector<std::string>* in_scene) -> bool {
+    for (std::size_t e = 0; e < job_.cameras.size(); ++e) {
+      if (to.cameras.size() > limits.max_views) return false;
+      const CameraEntry& entry = job_.cameras[e];
+      if (const auto* given = std::get_if<GivenCameras>(&entry)) {
+        for (std::size_t i = 0; i < given->cameras.size(); ++i) {
+          add(to, e, i, given->cameras[i].name);
+        }
+      } else if (const auto* orbit = std::get_if<OrbitCameras>(&entry)) {
+        if (orbit->n > limits.max_views) return false;
+        for (std::uint64_t i = 0; i < orbit->n; ++i) add(to, e, i, orbit_name(*orbit, i));
+      } else if (const auto* named = std::get_if<NamedCamera>(&entry)) {
+        if (const auto* name = std::get_if<std::string>(&named->which)) {
+          add(to, e, 0, *name);
+          continue;
+        }
+        const auto index = static_cast<std::size_t>(std::get<std::int64_t>(named->which));
+        const bool known = in_scene != nullptr && index < in_scene->size();
+        add(to, e, 0, known ? (*in_scene)[index] : fmt::format("camera {}", index));
+      } else if (in_scene == nullptr || in_scene->empty()) {
+        add(to, e, 0, "framed");
+      } else {
+        for (std::size_t i = 0; i < in_scene->size(); ++i) add(to, e, i, (*in_scene)[i]);
+      }
+    }
+    return true;
+  };
+  if (std::none_of(job_.cameras.begin(), job_.cameras.end(), depends_on_scene)) {
+    if (!fill(common_, nullptr)) return too_many_views(job_, limits.max_views);
+    return {};
+  }
+  std::map<std::pair<std::string, int>, std::size_t> seen;  // the same file may come many times
+  for (const JobScene& scene : job_.scenes) {
+    const auto [at, is_new] =
+        seen.try_emplace({scene.source, scene.scene.value_or(-1)}, own_.size());
+    if (!is_new) {
+      own_.push_back(own_[at->second]);
+      continue;
+    }
+    SceneCameras cameras;
+    const auto names = probe_cameras(scene, limits);
+    if (!fill(cameras, names ? &*names : nullptr)) return too_many_views(job_, limits.max_views);
+    own_.push_back(std::move(cameras));
+  }
+  return {};
+}
+
+const Plan::SceneCameras& Plan::cameras_of(std::size_t scene) const {
+  return own_.empty() ? common_ : own_[scene];
+}
+
+void Plan::choose_folder(const std::string& base) {
+  for (const JobOutput& output : job_.outputs) {
+    const bool absolute = output.pattern.text().starts_with('/');
+    patterns_folder_.push_back(absolute ? "" : base);
+    const std::string folder = patterns_folder_.back() + output.pattern.folder();
+    folder_ = patterns_folder_.size() == 1 ? folder : common_folder(folder_, folder);
+  }
+}
+
+std::pair<std::uint64_t, std::uint64_t> Plan::part(const Shard& shard) const {
+  // floor(I V / N) without overflow: V and N are below 2^32 by far in practice, 128 bits in theory.
+  const auto bound = [&](std::uint64_t i) {
+    return static_cast<std::uint64_t>(static_cast<unsigned __int128>(views()) * i / shard.count);
+  };
+  return {bound(shard.index - 1), bound(shard.index)};
+}
+
+View Plan::view(std::uint64_t index) const {
+  const auto after = std::upper_bound(first_view_.begin(), first_view_.end(), index);
+  View view;
+  view.index = index;
+  view.scene = static_cast<std::size_t>(after - first_view_.begin()) - 1;
+  const std::uint64_t rest = index - first_view_[view.scene];
+  const std::uint64_t cameras = cameras_of(view.scene).cameras.size();
+  view.camera = rest % cameras;
+  if (!job_.frames.empty()) {
+    view.frame = job_.frames[static_cast<std::size_t>(rest / cameras)];
+    view.time = static_cast<double>(view.frame) / job_.fps;
+  }
+  return view;
+}
+
+PlannedCamera Plan::camera(const View& view) const {
+  return cameras_of(view.scene).cameras[view.camera];
+}
+
+const std::string& Plan::camera_name(const View& view) const {
+  return cameras_of(view.scene).names[view.camera];
+}
+
+PathFields Plan::fields(const View& view) const {
+  PathFields fields;
+  fields.scene = scene_names_[view.scene];
+  fields.camera = cameras_of(view.scene).path_names[view.camera];
+  fields.frame = view.frame;
+  fields.view = view.index;
+  fields.scene_index = view.scene;
+  fields.camera_index = view.camera;
+  return fields;
+}
+
+std::vector<Output> Plan::files(const View& view) const {
+  std::vector<Output> files;
+  PathFields values = fields(view);
+  for (std::size_t i = 0; i < job_.outputs.size(); ++i) {
+    const JobOutput& output = job_.outputs[i];
+    for (std::size_t f = 0; f < output.files.size(); ++f) {
+      if (output.pattern.has_aov()) values.aov = path_name(output.aov_words[f]);
+      files.push_back(output.files[f]);
+      files.back().path = patterns_folder_[i] + output.pattern.path(values);
+    }
+  }
+  return files;
+}
+
+render::AovSet Plan::needed_aovs() const {
+  render::AovSet needed;
+  for (const JobOutput& output : job_.outputs) needed |= batch::needed_aovs(output.files);
+  return needed;
+}
+
+Result<void> Plan::check_paths() const {
+  // Hashes first: a job may have millions of paths, and two equal ones are rare.
+  std::vector<std::uint64_t> hashes;
+  const auto each = [&](const auto& use) {
+    for (std::uint64_t index = 0; index < views(); ++index) {
+      const View at = view(index);
+      for (const Output& file : files(at)) use(at, file.path);
+    }
+  };
+  each([&](const View&, const std::string& path) { hashes.push_back(hash_text(path)); });
+  std::sort(hashes.begin(), hashes.end());
+  if (std::adjacent_find(hashes.begin(), hashes.end()) == hashes.end()) return {};
+  const auto twice = [&](const std::string& path) {
+    const auto range = std::equal_range(hashes.begin(), hashes.end(), hash_text(path));
+    return range.second - range.first > 1;
+  };
+  std::unordered_map<std::string, View> first;
+  std::string message;
+  each([&](const View& at, const std::string& path) {
+    if (!message.empty() || !twice(path)) return;
+    const auto [found, is_new] = first.try_emplace(path, at);
+    if (is_new) return;
+    const auto describe = [&](const View& one) {
+      return fmt::format("scene {} ({}), camera {} ({}), frame {}", one.scene,
+                         job_.scenes[one.scene].name, one.camera, camera_name(one), one.frame);
+    };
+    message = fmt::format(
+        "two files would be {}: of {} and of {}; name scenes and cameras apart, or use "
+        "{{scene_index}}, {{camera_index}} or {{view}}",
+        path, describe(found->second), describe(at));
+  });
+  if (message.empty()) return {};
+  return util::Error{util::Exit::usage, "", message, job_.file, "/output"};
+}
+
+}  // namespace octrace::batch

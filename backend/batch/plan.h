@@ -1,0 +1,77 @@
+// Every view of a job, in order, without holding them: scene by scene, frame by frame, camera by
+// camera.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "backend/batch/job.h"
+
+namespace octrace::batch {
+
+// One camera of a scene: its place in the job's entries.
+struct PlannedCamera {
+  std::size_t entry = 0;    // of Job::cameras
+  std::uint64_t index = 0;  // within the entry
+};
+
+struct View {
+  std::uint64_t index = 0;
+  std::size_t scene = 0;
+  std::uint64_t camera = 0;  // within the scene
+  std::int64_t frame = 0;
+  double time = 0.0;  // seconds
+};
+
+struct Shard {
+  std::uint64_t index = 1, count = 1;  // I of N, from 1
+};
+
+class Plan {
+ public:
+  // Reads the JSON of scenes whose cameras have to be known. Usage errors: two files of the same
+  // path; exit 6: more views than --max-views. `base` is the folder of relative outputs, "" or
+  // ending in '/'.
+  static util::Result<Plan> make(Job job, const std::string& base, const util::Limits& limits);
+
+  const Job& job() const { return job_; }
+  std::uint64_t views() const { return first_view_.back(); }
+  std::uint64_t first_view(std::size_t scene) const { return first_view_[scene]; }
+  // The views of a shard: [begin, end), a contiguous part; the parts differ by at most one in size.
+  std::pair<std::uint64_t, std::uint64_t> part(const Shard& shard) const;
+  View view(std::uint64_t index) const;
+  PlannedCamera camera(const View& view) const;
+  const std::string& camera_name(const View& view) const;
+
+  // The output folder: "" or ending in '/'. Paths of files are relative to it.
+  const std::string& folder() const { return folder_; }
+  std::vector<Output> files(const View& view) const;
+  render::AovSet needed_aovs() const;
+
+  // What the job comes to: everything that decides what is rendered, with defaults, and the scene
+  // files' identity. Equal texts: equal outputs.
+  nlohmann::ordered_json meaning(const util::Limits& limits) const;
+
+ private:
+  struct SceneCameras {
+    std::vector<PlannedCamera> cameras;
+    std::vector<std::string> names;       // as the scene or the job calls them
+    std::vector<std::string> path_names;  // made by path_name()
+  };
+  util::Result<void> find_cameras(const util::Limits& limits);
+  void choose_folder(const std::string& base);
+  util::Result<void> check_paths() const;
+  const SceneCameras& cameras_of(std::size_t scene) const;
+  PathFields fields(const View& view) const;
+
+  Job job_;
+  std::string folder_;
+  std::vector<std::string> patterns_folder_;  // of each output, what comes before its pattern
+  SceneCameras common_;                       // where no entry depends on the scene
+  std::vector<SceneCameras> own_;             // by scene; empty: common_ serves all
+  std::vector<std::string> scene_names_;      // made by path_name()
+  std::vector<std::uint64_t> first_view_;     // by scene, and the end
+};
+
+}  // namespace octrace::batch

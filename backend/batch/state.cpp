@@ -1,0 +1,216 @@
+#include "backend/batch/state.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstring>
+#include <filesystem>
+#include <set>
+
+#include "backend/batch/hash.h"
+#include "backend/batch/journal.h"
+#include "backend/util/atomic_file.h"
+
+namespace octrace::batch {
+
+namespace {
+
+using nlohmann::ordered_json;
+using util::Result;
+
+constexpr std::size_t kChangesShown = 5;
+
+std::string shown(const nlohmann::json& value) {
+  std::string text = value.dump();
+  if (text.size() > 60) text = text.substr(0, 57) + "...";
+  return text;
+}
+
+// "/size/0 was 640, is 320"
+std::string changes(const ordered_json& before, const ordered_json& now) {
+  const nlohmann::json was = before, is = now;  // sorted: the order of members means nothing
+  const nlohmann::json patch = nlohmann::json::diff(was, is);
+  std::string text;
+  for (std::size_t i = 0; i < patch.size() && i < kChangesShown; ++i) {
+    const std::string op = patch[i]["op"], path = patch[i]["path"];
+    const nlohmann::json::json_pointer pointer(path);
+    text += fmt::format("{}{}", i > 0 ? "; " : "", path);
+    if (op == "add") {
+      text += fmt::format(" is new: {}", shown(patch[i]["value"]));
+    } else if (op == "remove") {
+      text += fmt::format(" was {}, is gone", shown(was.at(pointer)));
+    } else {
+      text += fmt::format(" was {}, is {}", shown(was.at(pointer)), shown(patch[i]["value"]));
+    }
+  }
+  if (patch.size() > kChangesShown) {
+    text += fmt::format("; and {} more", patch.size() - kChangesShown);
+  }
+  return text;
+}
+
+bool same_job(const ordered_json& header, const ordered_json& meaning) {
+  return nlohmann::json(header.at("job")) == nlohmann::json(meaning);
+}
+
+bool files_are_there(const Plan& plan, std::uint64_t view, const ordered_json& line) {
+  const std::vector<Output> files = plan.files(plan.view(view));
+  const ordered_json& recorded = line.at("files");
+  if (recorded.size() != files.size()) return false;
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    std::error_code error;
+    const auto bytes = std::filesystem::file_size(files[i].path, error);
+    if (error || bytes != recorded[i].at("bytes").get<std::uint64_t>()) return false;
+  }
+  return true;
+}
+
+// The header of a journal; null where it has none yet.
+Result<ordered_json> read_header(const std::string& path) {
+  ordered_json header;
+  const util::Error found{util::Exit::ok, "", "", "", ""};
+  auto text = read_journal(path, [&](const ordered_json& line) -> Result<void> {
+    if (line.at("kind") == "job") header = line;
+    return found;  // one line is enough
+  });
+  if (!text && text.error().exit != util::Exit::ok) return text.error();
+  return header;
+}
+
+}  // namespace
+
+std::string state_folder(const std::string& output_folder) { return output_folder + ".octrace/"; }
+
+std::string journal_path(const std::string& output_folder, const Shard& shard) {
+  return fmt::format("{}journal-{}-of-{}.ndjson", state_folder(output_folder), shard.index,
+                     shard.count);
+}
+
+std::string shard_summary_path(const std::string& output_folder, const Shard& shard) {
+  return fmt::format("{}summary-{}-of-{}.json", state_folder(output_folder), shard.index,
+                     shard.count);
+}
+
+std::vector<std::string> journals_in(const std::string& output_folder) {
+  std::vector<std::string> paths;
+  std::error_code error;
+  const std::string folder = state_folder(output_folder);
+  for (const auto& entry : std::filesystem::directory_iterator(folder, error)) {
+    const std::string name = entry.path().filename().string();
+    if (name.starts_with("journal-") && name.ends_with(".ndjson")) paths.push_back(folder + name);
+  }
+  std::sort(paths.begin(), paths.end());
+  return paths;
+}
+
+Result<void> make_folder(const std::string& folder) {
+  if (folder.empty()) return {};
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (!error || std::filesystem::is_directory(folder)) return {};
+  return util::Error{util::Exit::io, "IO_ERROR",
+                     fmt::format("the folder cannot be made: {}", error.message()), folder, ""};
+}
+
+Result<Done> read_done(const Plan& plan, const ordered_json& meaning, const Shard& shard) {
+  Done done;
+  done.views.resize(plan.views());
+  done.scenes_described.resize(plan.job().scenes.size());
+  const std::string own = journal_path(plan.folder(), shard);
+  for (const std::string& path : journals_in(plan.folder())) {
+    bool first = true, ended = false;
+    auto text = read_journal(path, [&](const ordered_json& line) -> Result<void> {
+      const std::string kind = line.at("kind");
+      if (first) {
+        if (kind != "job") {
+          return util::Error{util::Exit::io, "JOURNAL",
+                             "its first line is broken; --force starts anew", path, ""};
+        }
+        if (!same_job(line, meaning)) {
+          return util::Error{
+              util::Exit::usage, "JOB_CHANGED",
+              fmt::format("the job is not the one that was begun in this folder: {} (--force "
+                          "starts anew)",
+                          changes(line.at("job"), meaning)),
+              path, ""};
+        }
+        if (path == own) done.has_journal = true;
+      }
+      first = false;
+      ended = kind == "end";
+      if (kind == "scene" && path == own) {
+        const auto scene = line.at("scene").get<std::size_t>();
+        if (scene < done.scenes_described.size()) done.scenes_described[scene] = true;
+      }
+      if (kind != "view") return {};
+      const auto view = line.at("view").get<std::uint64_t>();
+      if (view < done.views.size() && !done.views[view] && files_are_there(plan, view, line)) {
+        done.views[view] = true;
+        ++done.count;
+      }
+      return {};
+    });
+    if (!text) return text.error();
+    done.broken_lines += text->broken_lines;
+    done.clean = done.clean && ended;
+  }
+  return done;
+}
+
+Result<void> forget(const Plan& plan, const ordered_json& meaning, const Shard& shard) {
+  const std::string own = journal_path(plan.folder(), shard);
+  const std::string division = fmt::format("-of-{}.ndjson", shard.count);
+  for (const std::string& path : journals_in(plan.folder())) {
+    // Other shards of the same division may be running, or have run, beside this one.
+    bool keep = path != own && path.ends_with(division);
+    if (keep) {
+      auto header = read_header(path);
+      keep = header && (header->is_null() || same_job(*header, meaning));
+    }
+    if (!keep && ::unlink(path.c_str()) != 0) {
+      return util::Error{util::Exit::io, "IO_ERROR",
+                         fmt::format("cannot be removed: {}", std::strerror(errno)), path, ""};
+    }
+  }
+  return {};
+}
+
+void remove_leftovers(const Plan& plan, const Shard& shard) {
+  std::vector<std::uint64_t> targets;  // hashes of this shard's paths
+  std::set<std::string> folders;
+  const auto folder_of = [](const std::string& path) {
+    return path.substr(0, path.rfind('/') + 1);  // npos + 1 is 0: no folder
+  };
+  const auto add = [&](const std::string& path) {
+    targets.push_back(hash_text(path));
+    std::string folder = folder_of(path);
+    if (folders.empty() || *folders.rbegin() != folder) folders.insert(std::move(folder));
+  };
+  const auto [begin, end] = plan.part(shard);
+  for (std::uint64_t index = begin; index < end; ++index) {
+    for (const Output& file : plan.files(plan.view(index))) add(file.path);
+  }
+  add(shard_summary_path(plan.folder(), shard));
+  if (shard.count == 1) {
+    for (const char* name : {"summary.json", "cameras.json", "objects.json", "annotations.json"}) {
+      add(plan.folder() + name);
+    }
+  }
+  std::sort(targets.begin(), targets.end());
+  for (const std::string& folder : folders) {
+    std::error_code error;
+    const std::string place = folder.empty() ? "." : folder;
+    for (const auto& entry : std::filesystem::directory_iterator(place, error)) {
+      const auto target = util::target_of_temporary(entry.path().filename().string());
+      if (!target ||
+          !std::binary_search(targets.begin(), targets.end(), hash_text(folder + *target))) {
+        continue;
+      }
+      std::error_code ignored;
+      std::filesystem::remove(entry.path(), ignored);
+    }
+  }
+}
+
+}  // namespace octrace::batch

@@ -1,0 +1,58 @@
+// The folder .octrace beside a batch's outputs: who runs, what is done (docs/batch.md, "State").
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "backend/batch/plan.h"
+#include "backend/util/result.h"
+
+namespace octrace::batch {
+
+std::string state_folder(const std::string& output_folder);  // ends in '/'
+std::string journal_path(const std::string& output_folder, const Shard& shard);
+std::string shard_summary_path(const std::string& output_folder, const Shard& shard);
+std::vector<std::string> journals_in(const std::string& output_folder);  // paths, sorted
+
+// Makes a folder and those above it. Exit 5.
+util::Result<void> make_folder(const std::string& folder);
+
+// Held while a shard runs; gone with the process, however it ends.
+class RunLock {
+ public:
+  // Exit 5 where another run holds this shard's lock, or one of another division of the job; the
+  // message names it. Where the file system has no locks, a warning.
+  static util::Result<RunLock> acquire(const std::string& output_folder, const Shard& shard);
+  RunLock(RunLock&& other) noexcept;
+  RunLock& operator=(RunLock&&) = delete;
+  ~RunLock();
+
+ private:
+  explicit RunLock(int descriptor) : descriptor_(descriptor) {}
+  int descriptor_;
+};
+
+// What the journals of a folder say about a plan.
+struct Done {
+  std::vector<bool> views;             // by view, of the whole job
+  std::vector<bool> scenes_described;  // this shard's journal has the scene's line
+  std::uint64_t count = 0;             // of views that are done, in the whole job
+  std::uint64_t broken_lines = 0;
+  bool has_journal = false;  // this shard's own, with its header
+  bool clean = true;         // every journal ends in good order: nothing was killed
+};
+
+// Reads every journal; a view counts when its files are there with the sizes that its line says.
+// A usage error where a journal belongs to another job than `meaning`: says what changed.
+util::Result<Done> read_done(const Plan& plan, const nlohmann::ordered_json& meaning,
+                             const Shard& shard);
+
+// --force: forgets this shard's journal, and those of other jobs or divisions.
+util::Result<void> forget(const Plan& plan, const nlohmann::ordered_json& meaning,
+                          const Shard& shard);
+
+// Removes temporary files that a killed run of this shard left, and no other's.
+void remove_leftovers(const Plan& plan, const Shard& shard);
+
+}  // namespace octrace::batch
