@@ -19,5 +19,6 @@ void declare_info(CLI::App& program, Run& chosen);
 void declare_compare(CLI::App& program, Run& chosen);
 void declare_validate(CLI::App& program, Run& chosen);
 void declare_export(CLI::App& program, Run& chosen);
+void declare_batch(CLI::App& program, Run& chosen);
 
 }  // namespace octrace::app

@@ -62,6 +62,7 @@ int run(int argc, char** argv) {
   declare_compare(program, chosen);
   declare_validate(program, chosen);
   declare_export(program, chosen);
+  declare_batch(program, chosen);
   try {
     program.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

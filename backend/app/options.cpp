@@ -53,22 +53,26 @@ void add_scene_options(CLI::App& command, SceneRequest& request) {
                   "threads to use; 0: all cores. Never changes the result [0]")
       ->check(CLI::Range(0, 4096).description(""))
       ->type_name("N");
+  add_tuning_options(command, request.build, request.verify);
+  add_limit_options(command, request.limits);
+}
+
+void add_tuning_options(CLI::App& command, octree::BuildOptions& build, bool& verify) {
   add_choice<octree::Builder>(
-      command, "--builder", request.build.builder,
+      command, "--builder", build.builder,
       {{"median", octree::Builder::median}, {"sah", octree::Builder::sah}},
       "sah: surface-area heuristic; median: the paper's. Never changes the image [sah]")
       ->group(kTuning);
   command
-      .add_option("--leaf", request.build.leaf,
+      .add_option("--leaf", build.leaf,
                   "most vertices (median) or triangles (sah) in a leaf [8, 3]")
       ->check(CLI::Range(1, 1 << 20).description(""))
       ->type_name("N")
       ->group(kTuning);
   command
-      .add_flag("--verify", request.verify,
+      .add_flag("--verify", verify,
                 "check every invariant of the built octree; a violation is exit code 7")
       ->group(kTuning);
-  add_limit_options(command, request.limits);
 }
 
 void add_limit_options(CLI::App& command, util::Limits& limits) {
@@ -82,6 +86,10 @@ void add_limit_options(CLI::App& command, util::Limits& limits) {
   add_limit(command, "--max-texture-pixels", limits.max_texture_pixels, "one texture", false);
   add_limit(command, "--max-image-pixels", limits.max_image_pixels, "the rendered image", false);
   add_limit(command, "--max-spp", limits.max_spp, "samples a pixel", false);
+}
+
+void add_views_limit(CLI::App& command, util::Limits& limits) {
+  add_limit(command, "--max-views", limits.max_views, "views of the job, in all its shards", false);
 }
 
 void add_verbosity_options(CLI::App& command) {

@@ -21,6 +21,9 @@ using batch::usage_error;
 // SCENE, --scene, --missing-images, --builder, --leaf, --threads, --verify, --max-...
 void add_scene_options(CLI::App& command, SceneRequest& request);
 void add_limit_options(CLI::App& command, util::Limits& limits);
+void add_views_limit(CLI::App& command, util::Limits& limits);  // --max-views
+// --builder, --leaf, --verify
+void add_tuning_options(CLI::App& command, octree::BuildOptions& build, bool& verify);
 void add_verbosity_options(CLI::App& command);  // --quiet, --verbose
 
 // An option that takes one of a few words.

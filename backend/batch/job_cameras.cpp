@@ -17,7 +17,7 @@ constexpr double kFar = 1e30;  // positions must stay within the range of float
 
 Result<glm::dvec3> parse_point(const JsonAt& json) {
   if (auto count = json.array(3, 3); !count) return count.error();
-  glm::dvec3 point;
+  glm::dvec3 point(0.0);
   for (int c = 0; c < 3; ++c) {
     auto value = json.at(static_cast<std::size_t>(c)).number(-kFar, kFar);
     if (!value) return value.error();

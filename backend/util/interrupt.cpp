@@ -43,5 +43,6 @@ InterruptGuard::~InterruptGuard() {
 
 const std::atomic<bool>& interrupt_flag() { return flag; }
 int interrupt_signal() { return signal_number; }
+void acknowledge_interrupt() { flag = false; }
 
 }  // namespace octrace::util

@@ -18,5 +18,8 @@ class InterruptGuard {
 
 const std::atomic<bool>& interrupt_flag();
 int interrupt_signal();  // the signal's number; 0: none came
+// The work has stopped: the flag is taken back, so that what came of it can be written. The
+// signal's number stays, and another signal ends the process.
+void acknowledge_interrupt();
 
 }  // namespace octrace::util

@@ -1,0 +1,217 @@
+#include "backend/batch/view_writer.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <new>
+
+#include "backend/batch/camera_choice.h"
+#include "backend/batch/output.h"
+#include "backend/util/interrupt.h"
+#include "backend/util/process.h"
+
+namespace octrace::batch {
+
+namespace {
+
+using nlohmann::ordered_json;
+using util::Result;
+
+// Lines since the last flush are lost by a power cut, and their views rendered again.
+constexpr double kFlushSeconds = 1.0;
+constexpr std::uint64_t kFramebufferBytes = 2ull << 30;  // of all framebuffers, but for two
+
+std::size_t most_framebuffers(const Plan& plan, unsigned threads) {
+  std::uint64_t channels = 0;
+  for (const render::AovInfo& info : render::aov_table()) {
+    if (plan.needed_aovs().test(static_cast<std::size_t>(info.aov))) {
+      channels += static_cast<std::uint64_t>(info.channel_count);
+    }
+  }
+  const ImageSize& size = plan.job().size;
+  const std::uint64_t bytes = std::uint64_t{size.width} * size.height * channels * 4;
+  const std::uint64_t fitting = kFramebufferBytes / std::max<std::uint64_t>(bytes, 1);
+  return static_cast<std::size_t>(
+      std::clamp<std::uint64_t>(fitting, 2, std::uint64_t{threads} + 2));
+}
+
+ordered_json error_json(const util::Error& error) {
+  return {{"exit", static_cast<int>(error.exit)},
+          {"code", error.code},
+          {"file", error.file},
+          {"pointer", error.pointer},
+          {"message", error.message}};
+}
+
+}  // namespace
+
+ViewWriter::ViewWriter(const Plan& plan, Journal& journal, unsigned threads,
+                       std::function<void()> report)
+    : plan_(plan),
+      journal_(journal),
+      report_(std::move(report)),
+      most_framebuffers_(most_framebuffers(plan, threads)) {
+  const std::size_t writers = std::min<std::size_t>(threads, most_framebuffers_ - 1);
+  for (std::size_t i = 0; i < writers; ++i) threads_.emplace_back([this] { work(); });
+}
+
+ViewWriter::~ViewWriter() { finish(); }
+
+std::unique_ptr<render::Framebuffer> ViewWriter::acquire() {
+  std::unique_lock lock(mutex_);
+  changed_.wait(
+      lock, [&] { return outcome_.fatal || !free_.empty() || framebuffers_ < most_framebuffers_; });
+  if (outcome_.fatal) return nullptr;
+  if (free_.empty()) {
+    ++framebuffers_;
+    lock.unlock();
+    const ImageSize& size = plan_.job().size;
+    return std::make_unique<render::Framebuffer>(size.width, size.height, plan_.needed_aovs());
+  }
+  auto framebuffer = std::move(free_.back());
+  free_.pop_back();
+  return framebuffer;
+}
+
+void ViewWriter::give_back(std::unique_ptr<render::Framebuffer> framebuffer) {
+  const std::lock_guard lock(mutex_);
+  free_.push_back(std::move(framebuffer));
+  changed_.notify_all();
+}
+
+void ViewWriter::submit(TracedView view) {
+  const std::lock_guard lock(mutex_);
+  queue_.push_back(std::move(view));
+  changed_.notify_all();
+}
+
+void ViewWriter::finish() {
+  {
+    const std::lock_guard lock(mutex_);
+    closed_ = true;
+    changed_.notify_all();
+  }
+  for (std::thread& thread : threads_) thread.join();
+  threads_.clear();
+}
+
+bool ViewWriter::stopped() const {
+  const std::lock_guard lock(mutex_);
+  return outcome_.fatal.has_value();
+}
+
+ViewWriter::Outcome ViewWriter::outcome() const {
+  const std::lock_guard lock(mutex_);
+  return outcome_;
+}
+
+void ViewWriter::work() {
+  for (;;) {
+    std::unique_lock lock(mutex_);
+    changed_.wait(lock, [&] { return closed_ || !queue_.empty(); });
+    if (queue_.empty()) return;
+    TracedView view = std::move(queue_.front());
+    queue_.pop_front();
+    const bool stop = outcome_.fatal.has_value();
+    lock.unlock();
+    if (!stop && !util::interrupt_flag()) write(view);
+    give_back(std::move(view.framebuffer));
+  }
+}
+
+void ViewWriter::write(TracedView& view) {
+  const util::Timer timer;
+  auto files = [&]() -> Result<ordered_json> {
+    try {
+      return write_files(view);
+    } catch (const std::bad_alloc&) {
+      return util::Error{util::Exit::limit, "", "out of memory", "", ""};
+    }
+  }();
+  const double write_ms = timer.milliseconds();
+  if (!files) {
+    if (util::interrupt_flag()) return;  // dropped: the next run makes it
+    if (files.error().exit == util::Exit::io) return stop(files.error());
+    return fail({view.view.index, view.view.scene, 1, files.error()});
+  }
+  ordered_json line = {{"kind", "view"},
+                       {"view", view.view.index},
+                       {"scene", view.view.scene},
+                       {"name", plan_.job().scenes[view.view.scene].name},
+                       {"camera", view.camera.name},
+                       {"frame", view.view.frame}};
+  if (!plan_.job().frames.empty()) line["time"] = view.view.time;
+  line["size"] = {view.framebuffer->width(), view.framebuffer->height()};
+  line["files"] = std::move(*files);
+  line["lens"] = ordered_json::parse(camera_json(view.camera));
+  line["ms"] = {view.trace_ms, write_ms};
+  if (auto noted = note(line); !noted) return stop(noted.error());
+  {
+    const std::lock_guard lock(mutex_);
+    ++outcome_.done;
+    outcome_.write_ms += write_ms;
+  }
+  const std::lock_guard lock(report_mutex_);
+  report_();
+}
+
+Result<ordered_json> ViewWriter::write_files(const TracedView& view) const {
+  const Metadata metadata = view_metadata(plan_.job().scenes[view.view.scene].source, view.camera);
+  ordered_json files = ordered_json::array();
+  for (const Output& file : plan_.files(view.view)) {
+    auto written = write_output(file, *view.framebuffer, plan_.job().depth_scale, metadata);
+    if (!written && written.error().exit == util::Exit::io &&
+        !std::filesystem::exists(std::filesystem::path(file.path).parent_path())) {
+      // The first file of its folder.
+      const std::string folder = file.path.substr(0, file.path.rfind('/') + 1);
+      if (auto made = make_folder(folder); !made) return made.error();
+      written = write_output(file, *view.framebuffer, plan_.job().depth_scale, metadata);
+    }
+    if (!written) return written.error();
+    std::error_code error;
+    const auto bytes = std::filesystem::file_size(file.path, error);
+    if (error) return util::Error{util::Exit::io, "IO_ERROR", error.message(), file.path, ""};
+    files.push_back({{"path", file.path.substr(plan_.folder().size())}, {"bytes", bytes}});
+  }
+  return files;
+}
+
+void ViewWriter::note_scene(const ordered_json& line) {
+  if (auto noted = note(line); !noted) stop(noted.error());
+}
+
+void ViewWriter::fail(Failure failure) {
+  ordered_json line = {{"kind", "fail"}};
+  if (failure.view) line["view"] = *failure.view;
+  line["scene"] = failure.scene;
+  line["views"] = failure.views;
+  line["error"] = error_json(failure.error);
+  if (auto noted = note(line); !noted) stop(noted.error());
+  {
+    const std::lock_guard lock(mutex_);
+    outcome_.failed += failure.views;
+    if (outcome_.failures.size() < RunSummary::kMostFailures) {
+      outcome_.failures.push_back(std::move(failure));
+    }
+  }
+  const std::lock_guard lock(report_mutex_);
+  report_();
+}
+
+Result<void> ViewWriter::note(const ordered_json& line) {
+  const std::string text = line.dump(-1, ' ', false, ordered_json::error_handler_t::replace);
+  const std::lock_guard lock(journal_mutex_);
+  if (auto appended = journal_.append(text); !appended) return appended;
+  if (since_flush_.seconds() < kFlushSeconds) return {};
+  since_flush_ = util::Timer();
+  return journal_.flush();
+}
+
+void ViewWriter::stop(const util::Error& error) {
+  const std::lock_guard lock(mutex_);
+  if (!outcome_.fatal) outcome_.fatal = error;
+  changed_.notify_all();
+}
+
+}  // namespace octrace::batch

@@ -1,0 +1,82 @@
+// The far end of a batch: encodes and writes traced views on threads of their own, and notes each
+// in the journal once its files are complete.
+#pragma once
+
+#include <condition_variable>
+#include <deque>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <thread>
+#include <vector>
+
+#include "backend/batch/journal.h"
+#include "backend/batch/plan.h"
+#include "backend/batch/runner.h"
+#include "backend/batch/state.h"
+#include "backend/render/framebuffer.h"
+#include "backend/util/process.h"
+
+namespace octrace::batch {
+
+struct TracedView {
+  View view;
+  scene::Camera camera;
+  std::unique_ptr<render::Framebuffer> framebuffer;
+  double trace_ms = 0.0;
+};
+
+class ViewWriter {
+ public:
+  // `report` is called after every view, by one thread at a time.
+  ViewWriter(const Plan& plan, Journal& journal, unsigned threads, std::function<void()> report);
+  ~ViewWriter();  // finishes
+  ViewWriter(const ViewWriter&) = delete;
+  ViewWriter& operator=(const ViewWriter&) = delete;
+
+  // A framebuffer of the job's size, used before or new; waits while all are in use, which bounds
+  // how far tracing runs ahead. Null: the run is to stop.
+  std::unique_ptr<render::Framebuffer> acquire();
+  void give_back(std::unique_ptr<render::Framebuffer> framebuffer);
+  void submit(TracedView view);
+
+  void note_scene(const nlohmann::ordered_json& line);  // before the scene's views
+  void fail(Failure failure);
+  void finish();  // returns when all that was submitted is done
+
+  bool stopped() const;
+  struct Outcome {
+    std::uint64_t done = 0, failed = 0;
+    std::vector<Failure> failures;
+    std::optional<util::Error> fatal;
+    double write_ms = 0.0;
+  };
+  Outcome outcome() const;  // also while running
+
+ private:
+  void work();
+  void write(TracedView& view);
+  util::Result<nlohmann::ordered_json> write_files(const TracedView& view) const;
+  util::Result<void> note(const nlohmann::ordered_json& line);
+  void stop(const util::Error& error);
+
+  const Plan& plan_;
+  Journal& journal_;
+  std::function<void()> report_;
+  std::size_t most_framebuffers_;
+
+  mutable std::mutex mutex_;  // of all below
+  std::condition_variable changed_;
+  std::deque<TracedView> queue_;
+  std::vector<std::unique_ptr<render::Framebuffer>> free_;
+  std::size_t framebuffers_ = 0;
+  bool closed_ = false;
+  Outcome outcome_;
+
+  std::mutex journal_mutex_, report_mutex_;
+  util::Timer since_flush_;
+  std::vector<std::thread> threads_;
+};
+
+}  // namespace octrace::batch
