@@ -52,7 +52,8 @@ std::string path_name(std::string_view name) {
     i += taken;
   }
   if (out.starts_with('.')) out.front() = '_';
-  return out.empty() ? "_" : out;
+  if (out.empty()) out = '_';
+  return out;
 }
 
 util::Result<OutputPattern::Piece> OutputPattern::parse_field(std::string_view text) {

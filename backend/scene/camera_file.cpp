@@ -5,11 +5,11 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <fstream>
 #include <initializer_list>
 #include <nlohmann/json.hpp>
 #include <string_view>
 
-#include "backend/gltf/files.h"
 #include "backend/gltf/issues.h"
 #include "backend/gltf/json_text.h"
 #include "backend/scene/camera.h"
@@ -21,6 +21,7 @@ namespace {
 using nlohmann::json;
 
 constexpr std::size_t kMaxBytes = 1 << 20;  // a camera takes some 300
+constexpr std::size_t kChunk = 1 << 16;
 constexpr double kPi = 3.141592653589793;
 
 class Reader {
@@ -176,14 +177,26 @@ util::Result<void> read_lens(const Reader& reader, Camera& camera) {
 }
 
 util::Result<json> parse(const std::string& path, const util::Limits& limits) {
-  auto bytes = gltf::read_regular_file(path, limits.max_file_bytes);
-  if (!bytes) {
-    bytes.error().file = path;
-    return bytes.error();
+  const auto failed = [&](util::Exit exit, std::string code, std::string message) {
+    return util::Error{exit, std::move(code), std::move(message), path, ""};
+  };
+  std::ifstream stream(path, std::ios::binary);  // a pipe serves as well
+  if (!stream) return failed(util::Exit::io, "IO_ERROR", "cannot be opened");
+  std::string text;
+  while (stream && text.size() <= limits.max_json_bytes) {
+    const std::size_t before = text.size();
+    text.resize(before + kChunk);
+    stream.read(text.data() + before, kChunk);
+    text.resize(before + static_cast<std::size_t>(stream.gcount()));
+  }
+  if (stream.bad()) return failed(util::Exit::io, "IO_ERROR", "cannot be read");
+  if (text.size() > limits.max_json_bytes) {
+    return failed(
+        util::Exit::limit, "",
+        fmt::format("is longer than the {} bytes that are read of cameras", limits.max_json_bytes));
   }
   gltf::Issues issues(path);
-  json root = gltf::parse_json({reinterpret_cast<const char*>(bytes->data()), bytes->size()},
-                               limits, issues);
+  json root = gltf::parse_json(text, limits, issues);
   if (issues.failed()) return issues.take_error();
   return root;
 }
@@ -218,7 +231,7 @@ util::Result<Camera> read_camera(const Reader& reader, const std::string& name) 
 
 util::Result<Camera> read_camera_file(const std::string& path) {
   util::Limits limits;
-  limits.max_file_bytes = limits.max_json_bytes = kMaxBytes;
+  limits.max_json_bytes = kMaxBytes;
   auto parsed = parse(path, limits);
   if (!parsed) return parsed.error();
   return read_camera(Reader(path, "", std::move(*parsed)), path);
