@@ -99,7 +99,8 @@ std::string info_json(const scene::SceneInfo& info, const octree::Statistics& oc
                        {"generator", info.generator},
                        {"copyright", info.copyright},
                        {"default_scene", info.default_scene},
-                       {"nodes", info.nodes}};
+                       {"nodes", info.nodes},
+                       {"hidden_nodes", info.hidden_nodes}};
   json["scenes"] = ordered_json::array();
   for (const auto& scene : info.scenes) {
     json["scenes"].push_back(
@@ -117,6 +118,10 @@ std::string info_json(const scene::SceneInfo& info, const octree::Statistics& oc
   json["images"] = ordered_json::array();
   for (const auto& image : info.images) {
     json["images"].push_back({{"name", image.name}, {"mime", image.mime}, {"bytes", image.bytes}});
+  }
+  json["variants"] = ordered_json::array();
+  for (const auto& variant : info.variants) {
+    json["variants"].push_back({{"name", variant.name}, {"primitives", variant.primitives}});
   }
   json["extensions"] = ordered_json::array();
   for (const auto& extension : info.extensions) {

@@ -97,6 +97,11 @@ void content_part(const scene::SceneInfo& info, Text& text) {
     const auto& image = info.images[i];
     text.line("image {} {}: {}, {} bytes", i, quoted(image.name), image.mime, image.bytes);
   }
+  for (std::size_t i = 0; i < info.variants.size(); ++i) {
+    text.line("variant {} {}: changes the material of {} primitives", i,
+              quoted(info.variants[i].name), info.variants[i].primitives);
+  }
+  if (info.hidden_nodes > 0) text.line("hidden: {} nodes", info.hidden_nodes);
   for (const auto& extension : info.extensions) {
     text.line("extension {}: {}{}", extension.name,
               extension.honoured ? "honoured" : "not honoured",

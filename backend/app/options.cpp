@@ -44,6 +44,13 @@ void add_scene_options(CLI::App& command, SceneRequest& request) {
   command.add_option("--scene", request.scene, "index of the glTF scene [the file's default]")
       ->check(CLI::Range(0, 1 << 24).description(""))
       ->type_name("N");
+  command
+      .add_option("--variant", request.variant,
+                  "name or index of a variant of the materials [the file's own materials]")
+      ->check([](const std::string& name) {  // an unset variable of a shell
+        return name.empty() ? std::string("a name or an index is needed") : std::string();
+      })
+      ->type_name("NAME|INDEX");
   add_choice<bool>(
       command, "--missing-images", request.missing_images_warn, {{"error", false}, {"warn", true}},
       "a missing or broken texture: error, or warn and use the material's factor alone "

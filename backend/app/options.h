@@ -18,7 +18,7 @@ using batch::SceneRequest;
 using batch::SceneSession;
 using batch::usage_error;
 
-// SCENE, --scene, --missing-images, --builder, --leaf, --threads, --verify, --max-...
+// SCENE, --scene, --variant, --missing-images, --builder, --leaf, --threads, --verify, --max-...
 void add_scene_options(CLI::App& command, SceneRequest& request);
 void add_limit_options(CLI::App& command, util::Limits& limits);
 void add_views_limit(CLI::App& command, util::Limits& limits);  // --max-views

@@ -33,6 +33,11 @@ util::Result<void> load_builtin(const SceneRequest& request, SceneSession& sessi
         util::Exit::usage, "",
         fmt::format("--scene {}: {} has one scene, 0", *request.scene, request.source), "", ""};
   }
+  if (!request.variant.empty()) {
+    return util::Error{
+        util::Exit::usage, "",
+        fmt::format("--variant {}: {} has no variants", request.variant, request.source), "", ""};
+  }
   util::Result<scene::Scene> made = scene::make_builtin(name, request.limits);
   if (!made) return made.error();
   session.scene = std::move(*made);
@@ -58,6 +63,7 @@ util::Result<void> load_file(const SceneRequest& request, SceneSession& session)
   for (const std::string& warning : document->warnings) util::log_warning(warning);
   scene::FlattenOptions options;
   options.scene = request.scene;
+  options.variant = request.variant;
   options.need_textures = request.need_textures;
   options.missing_images_warn = request.missing_images_warn;
   options.limits = request.limits;

@@ -18,6 +18,7 @@ namespace octrace::batch {
 struct SceneRequest {
   std::string source;         // a file, or builtin:NAME
   std::optional<int> scene;   // --scene
+  std::string variant;        // --variant: name or index, empty for none
   bool decode_images = true;  // false: textures are white, for uses that look at no image
   bool need_textures = true;  // false: only textures that alpha tests need are decoded
   bool missing_images_warn = false;

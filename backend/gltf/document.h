@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <span>
 #include <string>
 #include <string_view>
@@ -49,6 +50,13 @@ util::Result<Document> load(const std::string& path, const LoadOptions& options)
 // The same from memory, where no external file can be read; `name` stands in messages.
 util::Result<Document> load_bytes(std::vector<std::uint8_t> bytes, const std::string& name,
                                   const LoadOptions& options);
+
+// KHR_materials_variants: what the file's variants are called; empty where it has none.
+std::vector<std::string> variant_names(const tinygltf::Model& model);
+// The primitive's materials by variant, for those variants that it maps.
+std::map<int, int> variant_materials(const tinygltf::Primitive& primitive);
+// KHR_node_visibility of the node itself; its parents may still hide it.
+bool node_visible(const tinygltf::Node& node);
 
 // Extensions whose meaning octrace follows.
 std::span<const std::string_view> supported_extensions();

@@ -8,13 +8,21 @@
 namespace octrace::gltf {
 namespace {
 
-constexpr std::array<std::string_view, 6> kHonoured{
-    "EXT_texture_webp",    "KHR_lights_punctual",   "KHR_materials_emissive_strength",
-    "KHR_materials_unlit", "KHR_mesh_quantization", "KHR_texture_transform",
+constexpr std::array<std::string_view, 10> kHonoured{
+    "EXT_meshopt_compression",
+    "EXT_texture_webp",
+    "KHR_draco_mesh_compression",
+    "KHR_lights_punctual",
+    "KHR_materials_emissive_strength",
+    "KHR_materials_unlit",
+    "KHR_materials_variants",
+    "KHR_mesh_quantization",
+    "KHR_node_visibility",
+    "KHR_texture_transform",
 };
 
 // These change nothing but a material, and leave glTF's own material as the fallback.
-constexpr std::array<std::string_view, 12> kApproximated{
+constexpr std::array<std::string_view, 11> kApproximated{
     "KHR_materials_anisotropy",
     "KHR_materials_clearcoat",
     "KHR_materials_diffuse_transmission",
@@ -25,7 +33,6 @@ constexpr std::array<std::string_view, 12> kApproximated{
     "KHR_materials_sheen",
     "KHR_materials_specular",
     "KHR_materials_transmission",
-    "KHR_materials_variants",
     "KHR_materials_volume",
 };
 

@@ -70,7 +70,7 @@ Allowed allowed_for(std::string_view semantic, bool target, bool quantised) {
   const unsigned deltas = target ? kSignedNormalised : 0u;
   if (semantic.starts_with("TEXCOORD_")) {
     return {{TINYGLTF_TYPE_VEC2, TINYGLTF_TYPE_VEC2},
-            kFloat | kUnsignedNormalised | deltas | (extra & kAnySmall)};
+            kFloat | kUnsignedNormalised | deltas | (extra & (target ? kSignedAny : kAnySmall))};
   }
   if (semantic.starts_with("COLOR_")) {
     return {{TINYGLTF_TYPE_VEC3, TINYGLTF_TYPE_VEC4}, kFloat | kUnsignedNormalised | deltas};
@@ -187,9 +187,9 @@ struct PrimitiveCheck {
     }
   }
 
-  void check_texture_coordinates() {
-    if (primitive.material < 0) return;
-    const auto& m = model.materials[static_cast<std::size_t>(primitive.material)];
+  void check_texture_coordinates(int material, const std::string& place) {
+    if (material < 0) return;
+    const auto& m = model.materials[static_cast<std::size_t>(material)];
     const auto needs = [&](const char* name, int index, int set,
                            const tinygltf::ExtensionMap& ext) {
       if (index < 0) return;
@@ -198,10 +198,10 @@ struct PrimitiveCheck {
         set = transform->second.Get("texCoord").GetNumberAsInt();
       }
       if (primitive.attributes.contains(fmt::format("TEXCOORD_{}", set))) return;
-      issues.invalid("MESH_PRIMITIVE_TOO_FEW_TEXCOORDS", pointer + "/material",
+      issues.invalid("MESH_PRIMITIVE_TOO_FEW_TEXCOORDS", pointer + place,
                      fmt::format("{} of material {} needs TEXCOORD_{}, which the primitive does "
                                  "not have",
-                                 name, primitive.material, set));
+                                 name, material, set));
     };
     const auto& pbr = m.pbrMetallicRoughness;
     const auto check = [&](const char* name, const auto& info) {
@@ -212,6 +212,19 @@ struct PrimitiveCheck {
     check("normalTexture", m.normalTexture);
     check("occlusionTexture", m.occlusionTexture);
     check("emissiveTexture", m.emissiveTexture);
+  }
+
+  // The primitive's own and those of KHR_materials_variants.
+  void check_materials() {
+    check_texture_coordinates(primitive.material, "/material");
+    const auto variants = primitive.extensions.find("KHR_materials_variants");
+    if (variants == primitive.extensions.end()) return;
+    const tinygltf::Value& mappings = variants->second.Get("mappings");
+    for (std::size_t i = 0; i < mappings.ArrayLen(); ++i) {
+      check_texture_coordinates(
+          mappings.Get(static_cast<int>(i)).Get("material").GetNumberAsInt(),
+          fmt::format("/extensions/KHR_materials_variants/mappings/{}/material", i));
+    }
   }
 };
 
@@ -229,7 +242,7 @@ void check_mesh_links(const tinygltf::Model& model, Issues& issues) {
       check.check_indices();
       if (issues.failed()) return;
       check.check_mode();
-      check.check_texture_coordinates();
+      check.check_materials();
       if (issues.failed()) return;
     }
   }

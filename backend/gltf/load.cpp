@@ -5,10 +5,12 @@
 
 #include "backend/gltf/data_checks.h"
 #include "backend/gltf/document.h"
+#include "backend/gltf/draco.h"
 #include "backend/gltf/files.h"
 #include "backend/gltf/glb.h"
 #include "backend/gltf/json_ref.h"
 #include "backend/gltf/links.h"
+#include "backend/gltf/meshopt.h"
 #include "backend/gltf/model.h"
 #include "backend/gltf/resources.h"
 #include "backend/gltf/structure.h"
@@ -72,6 +74,10 @@ void load_into(Document& document, Bytes bytes, const SceneFolder& folder,
   check_animation_links(structure.model, issues);
   if (issues.failed()) return;
   load_buffers(structure, std::move(bin), folder, options.limits, issues);
+  if (issues.failed()) return;
+  decode_meshopt(structure, options.limits, issues);
+  if (issues.failed()) return;
+  decode_draco(structure, options.limits, issues);
   if (issues.failed()) return;
   check_data(structure.model, issues);
   if (issues.failed()) return;

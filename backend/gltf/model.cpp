@@ -30,6 +30,71 @@ void take_buffers(Json& root, Structure& structure) {
   root.erase("buffers");
 }
 
+constexpr const char* kMeshopt = "EXT_meshopt_compression";
+constexpr const char* kDraco = "KHR_draco_mesh_compression";
+
+const Json* extension(const Json& object, const char* name) {
+  const auto extensions = object.find("extensions");
+  if (extensions == object.end()) return nullptr;
+  const auto found = extensions->find(name);
+  return found == extensions->end() ? nullptr : &*found;
+}
+
+// tinygltf keeps an extension's integers as int, which is too short for offsets, so compression is
+// read here.
+MeshoptView meshopt_view(const Json& json, std::size_t view) {
+  using Mode = MeshoptView::Mode;
+  using Filter = MeshoptView::Filter;
+  MeshoptView out;
+  out.view = view;
+  out.buffer = json["buffer"].get<std::size_t>();
+  out.byte_offset = json.value("byteOffset", std::uint64_t{0});
+  out.byte_length = json["byteLength"].get<std::uint64_t>();
+  out.byte_stride = json["byteStride"].get<std::uint64_t>();
+  out.count = json["count"].get<std::uint64_t>();
+  const std::string mode = json["mode"].get<std::string>();
+  out.mode = mode == "TRIANGLES" ? Mode::triangles
+             : mode == "INDICES" ? Mode::indices
+                                 : Mode::attributes;
+  const std::string filter = json.value("filter", "NONE");
+  out.filter = filter == "OCTAHEDRAL"    ? Filter::octahedral
+               : filter == "QUATERNION"  ? Filter::quaternion
+               : filter == "EXPONENTIAL" ? Filter::exponential
+                                         : Filter::none;
+  return out;
+}
+
+void read_compression(const Json& root, Structure& structure) {
+  const auto array = [&](const char* key) -> const Json& {
+    static const Json kEmpty = Json::array();
+    const auto found = root.find(key);
+    return found == root.end() ? kEmpty : *found;
+  };
+  for (const Json& buffer : array("buffers")) {
+    const Json* fallback = extension(buffer, kMeshopt);
+    structure.fallback_buffers.push_back(fallback && fallback->value("fallback", false));
+  }
+  const Json& views = array("bufferViews");
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    if (const Json* json = extension(views[i], kMeshopt)) {
+      structure.meshopt.push_back(meshopt_view(*json, i));
+    }
+  }
+  const Json& meshes = array("meshes");
+  for (std::size_t m = 0; m < meshes.size(); ++m) {
+    const Json& primitives = meshes[m]["primitives"];
+    for (std::size_t p = 0; p < primitives.size(); ++p) {
+      const Json* json = extension(primitives[p], kDraco);
+      if (!json) continue;
+      DracoPrimitive draco{m, p, (*json)["bufferView"].get<std::size_t>(), {}};
+      for (const auto& [name, id] : (*json)["attributes"].items()) {
+        draco.attributes[name] = id.get<std::uint32_t>();
+      }
+      structure.draco.push_back(std::move(draco));
+    }
+  }
+}
+
 void take_images(Json& root, Structure& structure) {
   if (!root.contains("images")) return;
   for (Json& object : root["images"]) {
@@ -98,6 +163,7 @@ bool same_sizes(const tinygltf::Model& model, const Json& root) {
 
 Structure make_model(Json root, Issues& issues) {
   Structure structure;
+  read_compression(root, structure);
   take_buffers(root, structure);
   take_images(root, structure);
   const auto taken = take_indices_without_view(root);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -18,9 +19,31 @@ struct Source {
   std::uint64_t byte_length = 0;  // buffers only
 };
 
+// A buffer view's EXT_meshopt_compression: where its compressed bytes are, and what they become.
+struct MeshoptView {
+  enum class Mode { attributes, triangles, indices };
+  enum class Filter { none, octahedral, quaternion, exponential };
+  std::size_t view = 0;    // index into bufferViews
+  std::size_t buffer = 0;  // of the compressed bytes
+  std::uint64_t byte_offset = 0, byte_length = 0;
+  std::uint64_t byte_stride = 0, count = 0;  // decoded: byte_stride * count bytes
+  Mode mode = Mode::attributes;
+  Filter filter = Filter::none;
+};
+
+// A primitive's KHR_draco_mesh_compression.
+struct DracoPrimitive {
+  std::size_t mesh = 0, primitive = 0;
+  std::size_t view = 0;                             // of the compressed bytes
+  std::map<std::string, std::uint32_t> attributes;  // unique ids in the Draco stream, by semantic
+};
+
 struct Structure {
   tinygltf::Model model;  // buffers without data, images without pixels
   std::vector<Source> buffers, images;
+  std::vector<bool> fallback_buffers;  // by buffer: stands in for compressed views only
+  std::vector<MeshoptView> meshopt;    // by view
+  std::vector<DracoPrimitive> draco;   // by mesh, then by primitive
 };
 
 // `root` has passed check_structure.

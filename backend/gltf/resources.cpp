@@ -52,10 +52,30 @@ void report(const util::Error& error, const std::string& pointer, Issues& issues
   issues.fail(error.exit, error.code, pointer, error.message);
 }
 
-std::vector<bool> buffers_with_views(const tinygltf::Model& model) {
-  std::vector<bool> used(model.buffers.size());
-  for (const auto& view : model.bufferViews) used[static_cast<std::size_t>(view.buffer)] = true;
-  return used;
+// Whether a buffer's bytes are read; `replaced`: only views name it whose compressed form is read
+// instead, from another buffer, so that its own bytes need not even be there.
+enum class Need { none, read, replaced };
+
+std::vector<Need> buffer_needs(const Structure& structure) {
+  const auto& views = structure.model.bufferViews;
+  std::vector<Need> needs(structure.buffers.size(), Need::none);
+  for (std::size_t i = 0; i < needs.size(); ++i) {
+    if (structure.fallback_buffers[i]) needs[i] = Need::replaced;
+  }
+  std::vector<bool> compressed(views.size());
+  for (const MeshoptView& view : structure.meshopt) {
+    compressed[view.view] = true;
+    needs[view.buffer] = Need::read;
+  }
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    Need& need = needs[static_cast<std::size_t>(views[i].buffer)];
+    if (!compressed[i]) {
+      need = Need::read;
+    } else if (need == Need::none) {
+      need = Need::replaced;
+    }
+  }
+  return needs;
 }
 
 void load_buffer(Structure& structure, std::size_t i, bool has_views, std::optional<Bytes>& bin,
@@ -170,10 +190,14 @@ util::Result<EncodedImage> load_image(const Structure& structure, std::size_t i,
 void load_buffers(Structure& structure, std::optional<Bytes> bin, const SceneFolder& folder,
                   const util::Limits& limits, Issues& issues) {
   Budget budget(limits, issues);
-  const std::vector<bool> used = buffers_with_views(structure.model);
+  const std::vector<Need> needs = buffer_needs(structure);
   for (std::size_t i = 0; i < structure.buffers.size() && !issues.failed(); ++i) {
+    if (needs[i] == Need::replaced) {
+      structure.buffers[i].uri = {};
+      continue;
+    }
     if (!budget.add(structure.buffers[i].byte_length, fmt::format("/buffers/{}", i))) return;
-    load_buffer(structure, i, used[i], bin, folder, limits, issues);
+    load_buffer(structure, i, needs[i] == Need::read, bin, folder, limits, issues);
     structure.buffers[i].uri = {};  // a data URI is as large as its bytes
   }
 }

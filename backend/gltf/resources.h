@@ -12,7 +12,8 @@
 
 namespace octrace::gltf {
 
-// Fills model.buffers[].data with exactly byteLength bytes each. `bin` is a GLB's second chunk.
+// Fills model.buffers[].data with exactly byteLength bytes each, but for those that compressed
+// views replace. `bin` is a GLB's second chunk.
 void load_buffers(Structure& structure, std::optional<std::vector<std::uint8_t>> bin,
                   const SceneFolder& folder, const util::Limits& limits, Issues& issues);
 

@@ -147,6 +147,8 @@ void check_structure(const JsonRef& root, const util::Limits& limits) {
   const JsonRef extensions = root.member("extensions");
   const JsonRef punctual = extensions.member("KHR_lights_punctual");
   sizes.lights = array_size(punctual, "lights");
+  const JsonRef variants = extensions.member("KHR_materials_variants");
+  sizes.variants = array_size(variants, "variants");
   if (root.issues().failed()) return;
   if (sizes.nodes > limits.max_nodes) {
     root.issues().fail(
@@ -160,6 +162,8 @@ void check_structure(const JsonRef& root, const util::Limits& limits) {
   check_images(root, sizes);
   check_materials(root, sizes);
   check_meshes(root, sizes);
+  check_variants(root, sizes);
+  check_compression(root, sizes);
   check_cameras(root);
   check_nodes(root, sizes);
   check_animations(root, sizes);

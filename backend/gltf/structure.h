@@ -13,7 +13,7 @@ namespace octrace::gltf {
 struct Sizes {
   std::size_t accessors = 0, animations = 0, buffers = 0, buffer_views = 0, cameras = 0, images = 0,
               lights = 0, materials = 0, meshes = 0, nodes = 0, samplers = 0, scenes = 0, skins = 0,
-              textures = 0;
+              textures = 0, variants = 0;
 };
 
 void check_structure(const JsonRef& root, const util::Limits& limits);
@@ -23,12 +23,14 @@ void check_asset(const JsonRef& root);
 void check_extension_lists(const JsonRef& root);
 void check_buffers(const JsonRef& root, const Sizes& sizes);  // and buffer views
 void check_accessors(const JsonRef& root, const Sizes& sizes);
-void check_images(const JsonRef& root, const Sizes& sizes);  // and textures, samplers
+void check_compression(const JsonRef& root, const Sizes& sizes);  // after buffers and meshes
+void check_images(const JsonRef& root, const Sizes& sizes);       // and textures, samplers
 void check_materials(const JsonRef& root, const Sizes& sizes);
 void check_meshes(const JsonRef& root, const Sizes& sizes);
-void check_nodes(const JsonRef& root, const Sizes& sizes);  // and scenes, skins
-void check_hierarchy(const JsonRef& root);                  // after check_nodes
-void check_cameras(const JsonRef& root);                    // and lights
+void check_variants(const JsonRef& root, const Sizes& sizes);  // after meshes
+void check_nodes(const JsonRef& root, const Sizes& sizes);     // and scenes, skins
+void check_hierarchy(const JsonRef& root);                     // after check_nodes
+void check_cameras(const JsonRef& root);                       // and lights
 void check_animations(const JsonRef& root, const Sizes& sizes);
 
 // The properties of every glTF object: name and extensions. Returns the (present or absent) object.

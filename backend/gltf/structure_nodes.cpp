@@ -74,6 +74,8 @@ void check_node(const JsonRef& root, const JsonRef& node, const Sizes& sizes) {
   const JsonRef extensions = node.member("extensions");
   const JsonRef punctual = extensions.member("KHR_lights_punctual");
   if (punctual) (void)punctual.required("light").as_index(sizes.lights, "light");
+  const JsonRef visibility = extensions.member("KHR_node_visibility");
+  (void)visibility.member("visible").as_boolean();
   for (const auto* key : {"weights", "skin"}) {
     const JsonRef dependent = node.member(key);
     if (dependent && !node.member("mesh")) {

@@ -104,7 +104,7 @@ util::Result<SceneChanges> Animator::move_to(Time time, Scene& scene) {
   const GeometryPlan part = part_of(plan_.geometry, moved_geometries(to));
   Scene placed;  // cameras and lights are few: all are placed again and compared
   if (auto ok = place_cameras(document_, plan_.nodes, to.worlds, placed); !ok) return ok.error();
-  if (auto ok = place_lights(document_, plan_.nodes, to.worlds, placed); !ok) return ok.error();
+  if (auto ok = place_lights(document_, plan_.visible, to.worlds, placed); !ok) return ok.error();
   const bool was_broken = broken_;
   broken_ = true;
   auto changes = replace_geometry(document_, part, to.pose, to.worlds, scene, winding_);

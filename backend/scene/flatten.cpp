@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <charconv>
+#include <iterator>
 #include <set>
 
 #include "backend/scene/flatten_materials.h"
@@ -72,6 +74,40 @@ std::vector<int> reachable_nodes(const tinygltf::Model& model, const std::vector
   return nodes;
 }
 
+util::Result<int> find_variant(const gltf::Document& document, const std::string& variant) {
+  if (variant.empty()) return -1;
+  const std::vector<std::string> names = gltf::variant_names(document.model);
+  const auto found = std::find(names.begin(), names.end(), variant);
+  if (found != names.end()) return static_cast<int>(found - names.begin());
+  std::size_t index = 0;
+  const char* end = variant.data() + variant.size();
+  const auto [stop, error] = std::from_chars(variant.data(), end, index);
+  if (error == std::errc() && stop == end && index < names.size()) return static_cast<int>(index);
+  std::string there;
+  for (std::size_t i = 0; i < names.size() && i < 10; ++i) {
+    there += fmt::format("{}{} \"{}\"", i > 0 ? ", " : "", i, printable(names[i]));
+  }
+  if (names.size() > 10) there += ", ...";
+  return util::Error{
+      util::Exit::usage, "",
+      fmt::format("--variant {}: there is no such variant; the file has {}{}{}", printable(variant),
+                  names.size(), names.empty() ? "" : ": ", there),
+      document.file, ""};
+}
+
+std::vector<int> visible_nodes(const tinygltf::Model& model, const std::vector<int>& nodes) {
+  std::vector<int> hidden;
+  for (std::size_t i = 0; i < model.nodes.size(); ++i) {
+    if (!gltf::node_visible(model.nodes[i])) hidden.push_back(static_cast<int>(i));
+  }
+  if (hidden.empty()) return nodes;
+  hidden = reachable_nodes(model, hidden);
+  std::vector<int> visible;
+  std::set_difference(nodes.begin(), nodes.end(), hidden.begin(), hidden.end(),
+                      std::back_inserter(visible));
+  return visible;
+}
+
 util::Result<Scene> flatten(const gltf::Document& document, const FlattenOptions& options) {
   return flatten(document, static_pose(document.model), options);
 }
@@ -94,9 +130,12 @@ util::Result<ScenePlan> plan_scene(const gltf::Document& document, const Flatten
   }
   const auto roots = root_nodes(document, options.scene);
   if (!roots) return roots.error();
+  const auto variant = find_variant(document, options.variant);
+  if (!variant) return variant.error();
   ScenePlan plan;
   plan.nodes = reachable_nodes(model, *roots);
-  auto geometry = plan_geometry(document, plan.nodes, options.limits);
+  plan.visible = visible_nodes(model, plan.nodes);
+  auto geometry = plan_geometry(document, plan.visible, *variant, options.limits);
   if (!geometry) return geometry.error();
   plan.geometry = std::move(*geometry);
   return plan;
@@ -112,7 +151,7 @@ util::Result<Scene> place_scene(const gltf::Document& document, const ScenePlan&
     return ok.error();
   }
   if (auto ok = place_cameras(document, plan.nodes, worlds, scene); !ok) return ok.error();
-  if (auto ok = place_lights(document, plan.nodes, worlds, scene); !ok) return ok.error();
+  if (auto ok = place_lights(document, plan.visible, worlds, scene); !ok) return ok.error();
   if (auto ok = place_materials(document, options, plan.geometry.default_material, scene); !ok) {
     return ok.error();
   }

@@ -4,6 +4,7 @@
 #include <functional>
 #include <optional>
 #include <span>
+#include <string>
 
 #include "backend/gltf/document.h"
 #include "backend/scene/scene.h"
@@ -25,6 +26,7 @@ using ImageDecoder = std::function<util::Result<DecodedImage>(
 
 struct FlattenOptions {
   std::optional<int> scene;          // --scene N; default: the file's own, else 0, else all nodes
+  std::string variant;               // --variant NAME|INDEX of KHR_materials_variants; empty: none
   bool need_textures = true;         // false: only what geometry and alpha tests need is decoded
   bool missing_images_warn = false;  // --missing-images warn: render with the factor alone
   util::Limits limits;
@@ -39,6 +41,13 @@ util::Result<Scene> flatten(const gltf::Document& document, const FlattenOptions
 struct Pose;
 util::Result<Scene> flatten(const gltf::Document& document, const Pose& pose,
                             const FlattenOptions& options);
+
+// The index of FlattenOptions::variant, by name before by number; -1 where it is empty. Usage error
+// where there is no such variant.
+util::Result<int> find_variant(const gltf::Document& document, const std::string& variant);
+
+// Those of `nodes` that neither hide themselves nor lie below one that does (KHR_node_visibility).
+std::vector<int> visible_nodes(const tinygltf::Model& model, const std::vector<int>& nodes);
 
 // `roots` and all their descendants, ascending.
 std::vector<int> reachable_nodes(const tinygltf::Model& model, const std::vector<int>& roots);

@@ -35,10 +35,12 @@ struct GeometryPlan {
   std::uint64_t bytes() const;
 };
 
-// `nodes`: those to show, ascending. Errors (exit 6) where a limit would be passed; nothing has
-// been allocated in proportion to counts in the file by then.
+// `nodes`: those to show, ascending; `variant`: of the materials, -1 for none. Errors (exit 6)
+// where a limit would be passed; nothing has been allocated in proportion to counts in the file by
+// then.
 util::Result<GeometryPlan> plan_geometry(const gltf::Document& document,
-                                         const std::vector<int>& nodes, const util::Limits& limits);
+                                         const std::vector<int>& nodes, int variant,
+                                         const util::Limits& limits);
 
 // By geometry: 1 where corners b and c are swapped, because the node mirrors.
 using Winding = std::vector<std::uint8_t>;

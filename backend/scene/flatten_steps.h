@@ -9,7 +9,8 @@
 namespace octrace::scene {
 
 struct ScenePlan {
-  std::vector<int> nodes;  // those that the scene shows, ascending
+  std::vector<int> nodes;    // those of the scene, ascending
+  std::vector<int> visible;  // those of them that KHR_node_visibility does not hide
   GeometryPlan geometry;
 };
 

@@ -48,8 +48,8 @@ class LeftOut {
 
 class Planner {
  public:
-  Planner(const gltf::Document& document, const util::Limits& limits)
-      : document_(document), limits_(limits) {}
+  Planner(const gltf::Document& document, int variant, const util::Limits& limits)
+      : document_(document), variant_(variant), limits_(limits) {}
 
   util::Result<GeometryPlan> plan(const std::vector<int>& nodes) {
     for (const int node : nodes) {
@@ -84,9 +84,10 @@ class Planner {
     geometry.first_triangle = static_cast<std::uint32_t>(plan_.triangles);
     geometry.first_vertex = static_cast<std::uint32_t>(plan_.vertices);
     geometry.object = static_cast<std::uint32_t>(node);
-    geometry.material = static_cast<std::uint32_t>(
-        primitive.material >= 0 ? primitive.material : document_.model.materials.size());
-    if (primitive.material < 0) plan_.default_material = true;
+    const int material = material_of(mesh, index, primitive);
+    geometry.material =
+        static_cast<std::uint32_t>(material >= 0 ? material : document_.model.materials.size());
+    if (material < 0) plan_.default_material = true;
     const auto reserve = [&](const char* attribute, std::uint64_t& total) {
       if (!primitive.attributes.contains(attribute)) return kernels::kNone;
       const std::uint64_t first = total;
@@ -111,6 +112,19 @@ class Planner {
         {node, static_cast<std::uint32_t>(plan_.geometries.size())});
     plan_.geometries.push_back(geometry);
     return {};
+  }
+
+  // Under the chosen variant. Many nodes may share a primitive of many mappings.
+  int material_of(int mesh, int index, const tinygltf::Primitive& primitive) {
+    if (variant_ < 0) return primitive.material;
+    const auto [entry, added] = materials_.try_emplace({mesh, index}, primitive.material);
+    if (added) {
+      const auto mapped = gltf::variant_materials(primitive);
+      if (const auto found = mapped.find(variant_); found != mapped.end()) {
+        entry->second = found->second;
+      }
+    }
+    return entry->second;
   }
 
   util::Result<void> check(std::uint64_t triangles, std::uint64_t vertices,
@@ -139,9 +153,11 @@ class Planner {
   }
 
   const gltf::Document& document_;
+  int variant_;
   const util::Limits& limits_;
   GeometryPlan plan_;
   std::map<std::pair<int, int>, std::size_t> sources_;
+  std::map<std::pair<int, int>, int> materials_;
   std::set<std::pair<int, int>> counted_;
   LeftOut left_out_;
 };
@@ -156,9 +172,9 @@ std::uint64_t GeometryPlan::bytes() const {
 }
 
 util::Result<GeometryPlan> plan_geometry(const gltf::Document& document,
-                                         const std::vector<int>& nodes,
+                                         const std::vector<int>& nodes, int variant,
                                          const util::Limits& limits) {
-  return Planner(document, limits).plan(nodes);
+  return Planner(document, variant, limits).plan(nodes);
 }
 
 }  // namespace octrace::scene

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <algorithm>
 #include <limits>
+#include <numeric>
 #include <set>
 
 #include "backend/scene/flatten.h"
@@ -136,6 +137,17 @@ SceneInfo::AnimationEntry animation_entry(const gltf::Document& document, std::s
   return entry;
 }
 
+void collect_variants(const Model& model, SceneInfo& info) {
+  for (std::string& name : gltf::variant_names(model)) info.variants.push_back({std::move(name)});
+  for (const tinygltf::Mesh& mesh : model.meshes) {
+    for (const tinygltf::Primitive& primitive : mesh.primitives) {
+      for (const auto& [variant, material] : gltf::variant_materials(primitive)) {
+        info.variants[variant].primitives += material != primitive.material;
+      }
+    }
+  }
+}
+
 void collect_extensions(const Model& model, SceneInfo& info) {
   const std::set<std::string> required(model.extensionsRequired.begin(),
                                        model.extensionsRequired.end());
@@ -160,6 +172,9 @@ SceneInfo collect_info(const gltf::Document& document, const Scene& scene) {
   info.copyright = model.asset.copyright;
   info.default_scene = model.defaultScene;
   info.nodes = model.nodes.size();
+  std::vector<int> all(model.nodes.size());
+  std::iota(all.begin(), all.end(), 0);
+  info.hidden_nodes = all.size() - visible_nodes(model, all).size();
   for (std::size_t i = 0; i < model.scenes.size(); ++i) {
     info.scenes.push_back({name_of(model.scenes, i, "scene"), model.scenes[i].nodes.size(),
                            reachable_nodes(model, model.scenes[i].nodes).size()});
@@ -183,6 +198,7 @@ SceneInfo collect_info(const gltf::Document& document, const Scene& scene) {
     if (model.images[i].name.empty() && !image.uri.empty()) name = image.uri;
     info.images.push_back({std::move(name), image.mime, image.bytes.size()});
   }
+  collect_variants(model, info);
   collect_extensions(model, info);
   collect_flattened(scene, info);
   return info;

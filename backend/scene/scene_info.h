@@ -61,6 +61,10 @@ struct SceneInfo {
     std::string mime;
     std::uint64_t bytes = 0;  // as encoded
   };
+  struct VariantEntry {  // KHR_materials_variants
+    std::string name;
+    std::uint64_t primitives = 0;  // that it gives a material of its own
+  };
   struct ExtensionEntry {
     std::string name;
     bool required = false, honoured = false;
@@ -71,6 +75,7 @@ struct SceneInfo {
   std::string version, generator, copyright;
   int default_scene = -1;
   std::uint64_t nodes = 0;
+  std::uint64_t hidden_nodes = 0;  // by KHR_node_visibility, their own or a parent's
   std::vector<SceneEntry> scenes;
   std::vector<CameraEntry> cameras;  // as placed in the flattened scene, in its order
   std::vector<MeshEntry> meshes;
@@ -79,6 +84,7 @@ struct SceneInfo {
   std::vector<AnimationEntry> animations;
   std::vector<SkinEntry> skins;
   std::vector<ImageEntry> images;
+  std::vector<VariantEntry> variants;
   std::vector<ExtensionEntry> extensions;  // used and required ones, sorted by name
 
   // The flattened scene, with every instance counted.

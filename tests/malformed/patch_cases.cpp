@@ -40,6 +40,17 @@ std::vector<std::uint8_t> png_of_size(std::uint8_t high_byte) {
 
 std::string primitive(const std::string& rest) { return "/meshes/0/primitives/0" + rest; }
 
+constexpr const char* kMappings = "/extensions/KHR_materials_variants/mappings";
+std::string mapping(const std::string& rest) { return primitive(kMappings + rest); }
+// Two variants, and the primitive's mappings of them.
+std::string variants(const std::string& mappings) {
+  return R"([{"op": "add", "path": "/extensions/KHR_materials_variants",
+              "value": {"variants": [{"name": "a"}, {"name": "b"}]}},
+             {"op": "add", "path": ")" +
+         primitive("/extensions") + R"(", "value": {"KHR_materials_variants": {"mappings": )" +
+         mappings + "}}}]";
+}
+
 }  // namespace
 
 std::vector<PatchCase> patch_cases() {
@@ -58,7 +69,7 @@ std::vector<PatchCase> patch_cases() {
        "/asset/minVersion"},
       {"required_unknown", set("/extensionsRequired/0", "\"EXT_no_such_thing\""),
        "UNSUPPORTED_EXTENSION", "/extensionsRequired/0", 4},
-      {"required_draco", set("/extensionsRequired/-", "\"KHR_draco_mesh_compression\""),
+      {"required_basisu", set("/extensionsRequired/-", "\"KHR_texture_basisu\""),
        "UNSUPPORTED_EXTENSION", "/extensionsRequired/1", 4},
       {"required_not_used", set("/extensionsUsed", "[\"KHR_lights_punctual\"]"),
        "UNSATISFIED_DEPENDENCY", "/extensionsRequired/0"},
@@ -74,6 +85,30 @@ std::vector<PatchCase> patch_cases() {
       {"nodes_object", set("/nodes", "{\"0\": {}}"), "TYPE_MISMATCH", "/nodes"},
       {"node_null", set("/nodes/0", "null"), "ARRAY_TYPE_MISMATCH", "/nodes"},
       {"node_string", set("/nodes/0", "\"x\""), "ARRAY_TYPE_MISMATCH", "/nodes"},
+
+      {"visible_number", set("/nodes/0/extensions", R"({"KHR_node_visibility": {"visible": 0}})"),
+       "TYPE_MISMATCH", "/nodes/0/extensions/KHR_node_visibility/visible"},
+      {"variants_missing", set("/extensions", R"({"KHR_materials_variants": {}})"),
+       "UNDEFINED_PROPERTY", "/extensions/KHR_materials_variants"},
+      {"variants_empty", set("/extensions", R"({"KHR_materials_variants": {"variants": []}})"),
+       "EMPTY_ENTITY", "/extensions/KHR_materials_variants/variants"},
+      {"variant_without_name",
+       set("/extensions", R"({"KHR_materials_variants": {"variants": [{}]}})"),
+       "UNDEFINED_PROPERTY", "/extensions/KHR_materials_variants/variants/0"},
+      {"variant_name_number",
+       set("/extensions", R"({"KHR_materials_variants": {"variants": [{"name": 1}]}})"),
+       "TYPE_MISMATCH", "/extensions/KHR_materials_variants/variants/0/name"},
+      {"mapping_beyond", variants(R"([{"material": 1, "variants": [2]}])"), "UNRESOLVED_REFERENCE",
+       mapping("/0/variants/0")},
+      {"mapping_twice", variants(R"([{"material": 1, "variants": [1]},
+                                     {"material": 0, "variants": [0, 1]}])"),
+       "DUPLICATE_ELEMENTS", mapping("/1/variants/1")},
+      {"mapping_material", variants(R"([{"material": 9, "variants": [0]}])"),
+       "UNRESOLVED_REFERENCE", mapping("/0/material")},
+      {"mapping_without_material", variants(R"([{"variants": [0]}])"), "UNDEFINED_PROPERTY",
+       mapping("/0")},
+      {"mapping_empty", variants("[]"), "EMPTY_ENTITY", mapping("")},
+      {"mapping_number", variants("[4]"), "ARRAY_TYPE_MISMATCH", mapping("")},
 
       // numbers
       {"index_negative", set("/nodes/3/mesh", "-1"), "INVALID_INDEX", "/nodes/3/mesh"},
