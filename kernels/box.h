@@ -37,7 +37,7 @@ struct SlabRay {
 OCTRACE_HD OCTRACE_FORCE_INLINE float safe_inverse(float d) {
   constexpr float kTiny = 8.271806125530277e-25f;  // 2^-80
   if (abs_of(d) < kTiny) d = d < 0.0f ? -kTiny : kTiny;
-  return div_rn(1.0f, d);
+  return reciprocal_rn(d);
 }
 
 OCTRACE_HD OCTRACE_FORCE_INLINE SlabRay make_slab_ray(const Ray& ray) {

@@ -5,8 +5,8 @@
 
 namespace octrace::kernels {
 
-// Points origin + t * direction for tmin <= t <= tmax. The direction need not have unit length:
-// camera rays are scaled so that t is the planar depth.
+// Points origin + t * direction for 0 <= tmin <= t <= tmax. The direction need not have unit
+// length: camera rays are scaled so that t is the planar depth.
 struct Ray {
   Vec3 origin;
   float tmin;

@@ -12,6 +12,7 @@ OCTRACE_HD OCTRACE_FORCE_INLINE float add_rn(float a, float b) { return __fadd_r
 OCTRACE_HD OCTRACE_FORCE_INLINE float sub_rn(float a, float b) { return __fsub_rn(a, b); }
 OCTRACE_HD OCTRACE_FORCE_INLINE float mul_rn(float a, float b) { return __fmul_rn(a, b); }
 OCTRACE_HD OCTRACE_FORCE_INLINE float div_rn(float a, float b) { return __fdiv_rn(a, b); }
+OCTRACE_HD OCTRACE_FORCE_INLINE float reciprocal_rn(float a) { return __frcp_rn(a); }
 OCTRACE_HD OCTRACE_FORCE_INLINE float fma_rn(float a, float b, float c) {
   return __fmaf_rn(a, b, c);
 }
@@ -22,6 +23,7 @@ OCTRACE_HD OCTRACE_FORCE_INLINE float add_rn(float a, float b) { return a + b; }
 OCTRACE_HD OCTRACE_FORCE_INLINE float sub_rn(float a, float b) { return a - b; }
 OCTRACE_HD OCTRACE_FORCE_INLINE float mul_rn(float a, float b) { return a * b; }
 OCTRACE_HD OCTRACE_FORCE_INLINE float div_rn(float a, float b) { return a / b; }
+OCTRACE_HD OCTRACE_FORCE_INLINE float reciprocal_rn(float a) { return 1.0f / a; }
 // One instruction where the function it is inlined into is compiled for FMA, else libm's.
 OCTRACE_HD OCTRACE_FORCE_INLINE float fma_rn(float a, float b, float c) {
   return __builtin_fmaf(a, b, c);

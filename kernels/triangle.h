@@ -35,15 +35,15 @@ OCTRACE_HD OCTRACE_FORCE_INLINE TriangleRay make_triangle_ray(const Vec3& d) {
   bool negative;
   if (az >= ax && az >= ay) {
     ray = {Vec3(1.0f, 0.0f, -div_rn(d.x, d.z)), Vec3(0.0f, 1.0f, -div_rn(d.y, d.z)),
-           Vec3(0.0f, 0.0f, div_rn(1.0f, d.z))};
+           Vec3(0.0f, 0.0f, reciprocal_rn(d.z))};
     negative = d.z < 0.0f;
   } else if (ay >= ax) {
     ray = {Vec3(0.0f, -div_rn(d.z, d.y), 1.0f), Vec3(1.0f, -div_rn(d.x, d.y), 0.0f),
-           Vec3(0.0f, div_rn(1.0f, d.y), 0.0f)};
+           Vec3(0.0f, reciprocal_rn(d.y), 0.0f)};
     negative = d.y < 0.0f;
   } else {
     ray = {Vec3(-div_rn(d.y, d.x), 1.0f, 0.0f), Vec3(-div_rn(d.z, d.x), 0.0f, 1.0f),
-           Vec3(div_rn(1.0f, d.x), 0.0f, 0.0f)};
+           Vec3(reciprocal_rn(d.x), 0.0f, 0.0f)};
     negative = d.x < 0.0f;
   }
   if (negative) {  // keeps the winding: a front face has a positive determinant

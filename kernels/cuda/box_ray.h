@@ -5,8 +5,8 @@
 // - A byte q becomes the float 2^15 + q by one byte permute; the 2^15 is taken off with the plane's
 //   constant. That rounds by 2^-9 of a step at most, for which kBiasError leaves 2^-8.
 // - Distances are compared as integers, three at a time (Hopper's VIMNMX3). Floats order like
-//   integers unless both are negative; tmin >= 0 takes part in every comparison for entry, and an
-//   exit that is negative at all is below it.
+//   integers unless both are negative; entries count from 0 on, as tmin does, and an exit that is
+//   negative at all is below that.
 // - A child is missed where exit - entry has its sign bit set; the bits are shifted together.
 // - The padding of kernels/box.h is taken once a ray, from the root's box, in place of once a node.
 //   It can only be wider, so the test stays conservative.
@@ -17,6 +17,7 @@
 namespace octrace::kernels::cuda {
 
 inline constexpr float kByteBias = 32768.0f;
+inline constexpr std::uint32_t kByteBiasBits = 0x47000000u;
 inline constexpr float kBiasError = 1.0f / 256;  // their sum is a float
 
 struct BoxRay {
@@ -62,9 +63,11 @@ __device__ OCTRACE_FORCE_INLINE BoxRay make_box_ray(const SlabRay& ray, const No
 
 class ChildTest {
  public:
-  // The node's children that the ray may meet between tmin and tmax; tmin >= 0.
+  // The node's children that the ray may meet between 0 and tmax.
+  // byte_bias: kByteBiasBits. Were its value known, the compiler would put it into the permutes and
+  // move their selectors into registers, 40 instructions more.
   __device__ OCTRACE_FORCE_INLINE static ChildMask test(const Node& node, const BoxRay& ray,
-                                                        float tmin, float tmax) {
+                                                        float tmax, std::uint32_t byte_bias) {
     const uint4* p = reinterpret_cast<const uint4*>(&node);
     const uint4 n0 = __ldg(p), n1 = __ldg(p + 1), n2 = __ldg(p + 2), n3 = __ldg(p + 3),
                 n4 = __ldg(p + 4);
@@ -77,9 +80,9 @@ class ChildTest {
     const bool nx = ray.octant & 1, ny = ray.octant & 2, nz = ray.octant & 4;
     std::uint32_t missed = 0;
     half(x, y, z, nx ? n3.w : n2.y, ny ? n4.y : n2.w, nz ? n4.w : n3.y, nx ? n2.y : n3.w,
-         ny ? n2.w : n4.y, nz ? n3.y : n4.w, tmin, tmax, &missed);
+         ny ? n2.w : n4.y, nz ? n3.y : n4.w, tmax, byte_bias, &missed);
     half(x, y, z, nx ? n3.z : n2.x, ny ? n4.x : n2.z, nz ? n4.z : n3.x, nx ? n2.x : n3.z,
-         ny ? n2.z : n4.x, nz ? n3.x : n4.z, tmin, tmax, &missed);
+         ny ? n2.z : n4.x, nz ? n3.x : n4.z, tmax, byte_bias, &missed);
     return {~missed & 0xffu, n0.w >> 24, n1.x, n1.y, {n1.z, n1.w}};
   }
 
@@ -97,8 +100,9 @@ class ChildTest {
   }
 
   template <int kByte>
-  __device__ OCTRACE_FORCE_INLINE static float biased(std::uint32_t bytes) {
-    return __uint_as_float(__byte_perm(bytes, 0x47000000u, 0x7404 | kByte << 4));
+  __device__ OCTRACE_FORCE_INLINE static float biased(std::uint32_t bytes,
+                                                      std::uint32_t byte_bias) {
+    return __uint_as_float(__byte_perm(bytes, byte_bias, 0x7404 | kByte << 4));
   }
 
   template <int kByte>
@@ -106,16 +110,17 @@ class ChildTest {
                                                     std::uint32_t near_x, std::uint32_t near_y,
                                                     std::uint32_t near_z, std::uint32_t far_x,
                                                     std::uint32_t far_y, std::uint32_t far_z,
-                                                    float tmin, float tmax, std::uint32_t* missed) {
+                                                    float tmax, std::uint32_t byte_bias,
+                                                    std::uint32_t* missed) {
     const int entry =
-        max(__vimax3_s32(__float_as_int(fma_rn(biased<kByte>(near_x), x.step, x.near)),
-                         __float_as_int(fma_rn(biased<kByte>(near_y), y.step, y.near)),
-                         __float_as_int(fma_rn(biased<kByte>(near_z), z.step, z.near))),
-            __float_as_int(tmin));
-    const int exit = min(__vimin3_s32(__float_as_int(fma_rn(biased<kByte>(far_x), x.step, x.far)),
-                                      __float_as_int(fma_rn(biased<kByte>(far_y), y.step, y.far)),
-                                      __float_as_int(fma_rn(biased<kByte>(far_z), z.step, z.far))),
-                         __float_as_int(tmax));
+        __vimax3_s32_relu(__float_as_int(fma_rn(biased<kByte>(near_x, byte_bias), x.step, x.near)),
+                          __float_as_int(fma_rn(biased<kByte>(near_y, byte_bias), y.step, y.near)),
+                          __float_as_int(fma_rn(biased<kByte>(near_z, byte_bias), z.step, z.near)));
+    const int exit =
+        min(__vimin3_s32(__float_as_int(fma_rn(biased<kByte>(far_x, byte_bias), x.step, x.far)),
+                         __float_as_int(fma_rn(biased<kByte>(far_y, byte_bias), y.step, y.far)),
+                         __float_as_int(fma_rn(biased<kByte>(far_z, byte_bias), z.step, z.far))),
+            __float_as_int(tmax));
     *missed =
         __funnelshift_l(__float_as_uint(__int_as_float(exit) - __int_as_float(entry)), *missed, 1);
   }
@@ -125,11 +130,12 @@ class ChildTest {
                                                    std::uint32_t near_x, std::uint32_t near_y,
                                                    std::uint32_t near_z, std::uint32_t far_x,
                                                    std::uint32_t far_y, std::uint32_t far_z,
-                                                   float tmin, float tmax, std::uint32_t* missed) {
-    child<3>(x, y, z, near_x, near_y, near_z, far_x, far_y, far_z, tmin, tmax, missed);
-    child<2>(x, y, z, near_x, near_y, near_z, far_x, far_y, far_z, tmin, tmax, missed);
-    child<1>(x, y, z, near_x, near_y, near_z, far_x, far_y, far_z, tmin, tmax, missed);
-    child<0>(x, y, z, near_x, near_y, near_z, far_x, far_y, far_z, tmin, tmax, missed);
+                                                   float tmax, std::uint32_t byte_bias,
+                                                   std::uint32_t* missed) {
+    child<3>(x, y, z, near_x, near_y, near_z, far_x, far_y, far_z, tmax, byte_bias, missed);
+    child<2>(x, y, z, near_x, near_y, near_z, far_x, far_y, far_z, tmax, byte_bias, missed);
+    child<1>(x, y, z, near_x, near_y, near_z, far_x, far_y, far_z, tmax, byte_bias, missed);
+    child<0>(x, y, z, near_x, near_y, near_z, far_x, far_y, far_z, tmax, byte_bias, missed);
   }
 };
 

@@ -36,11 +36,11 @@ template <bool kAnyHit>
 __global__ void __launch_bounds__(kBlock, kBlocks)
     rays_kernel(const __grid_constant__ SceneView scene,
                 const __grid_constant__ RenderParams params, const RayBuffer rays, Report* report) {
-  __shared__ VisitOrder visit_order;
+  __shared__ BlockShared block;
   __shared__ WarpShared shared[kBlock / kWarp];
-  visit_order.fill();
+  block.fill();
   __syncthreads();
-  trace_rays<kAnyHit, kRefillBelow>(scene, params, rays, shared[threadIdx.x / kWarp], visit_order,
+  trace_rays<kAnyHit, kRefillBelow>(scene, params, rays, shared[threadIdx.x / kWarp], block,
                                     report);
 }
 

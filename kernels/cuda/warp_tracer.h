@@ -9,6 +9,9 @@
 //   than half of the time. (After the compaction of Wald 2011, "Active thread compaction for GPU
 //   path tracing", within a warp.)
 //
+// Records of the queue are what node steps find, up to 24 triangles each; only when they are tested
+// are they spread over lanes, 32 at a time.
+//
 // A ray's tmax shrinks a few node steps late, which costs some nodes but changes no hit: the least
 // (t, triangle) wins, in whatever order it is found.
 #pragma once
@@ -21,12 +24,14 @@ namespace octrace::kernels::cuda {
 inline constexpr unsigned kWarp = 32;
 inline constexpr unsigned kAllLanes = 0xffffffffu;
 
-// What the warps of a block share: order[octant][mask] has bit s of mask at bit s ^ octant ^ 7.
-struct VisitOrder {
-  std::uint8_t order[8][256];
+// What the warps of a block share.
+struct BlockShared {
+  std::uint8_t order[8][256];  // [octant][mask]: bit s of mask at bit s ^ octant ^ 7
+  std::uint32_t byte_bias;     // kByteBiasBits, which the compiler may not know: see box_ray.h
 
   // By all threads of the block; a barrier must follow.
   __device__ void fill() {
+    if (threadIdx.x == 0) byte_bias = kByteBiasBits;
     for (unsigned i = threadIdx.x; i < 8 * 256; i += blockDim.x) {
       const unsigned octant = i / 256, mask = i % 256;
       unsigned ordered = 0;
@@ -46,8 +51,10 @@ struct alignas(16) WarpShared {
   // those the lowest index.
   unsigned long long best[kWarp];
   unsigned long long index[kWarp];  // of the lane's ray
-  uint2 queue[2 * kWarp];           // a ring: leaf triangle, lane
-  unsigned blocked;                 // any-hit: bit of each lane whose ray hit something
+  // A ring of what node steps found: first_triangle, the meta bytes of the leaves that the ray met
+  // (0: not met), lane. Every record has at least one triangle.
+  uint4 queue[2 * kWarp];
+  unsigned blocked;  // any-hit: bit of each lane whose ray hit something
 };
 
 // A lane's ray, where the others find it.
@@ -63,21 +70,113 @@ __device__ OCTRACE_FORCE_INLINE void publish(WarpShared& shared, unsigned lane, 
   shared.hit[lane] = make_float4(ray.tmax, 0.0f, 0.0f, __uint_as_float(kNone));
 }
 
-// Tests the first `count` pairs of the queue, one a lane.
+#if __CUDA_ARCH__ >= 800
+__device__ OCTRACE_FORCE_INLINE unsigned reduce_or(unsigned x) {
+  return __reduce_or_sync(kAllLanes, x);
+}
+__device__ OCTRACE_FORCE_INLINE unsigned reduce_add(unsigned x) {
+  return __reduce_add_sync(kAllLanes, x);
+}
+#else
+__device__ OCTRACE_FORCE_INLINE unsigned reduce_or(unsigned x) {
+  for (unsigned step = 1; step < kWarp; step *= 2) x |= __shfl_xor_sync(kAllLanes, x, step);
+  return x;
+}
+__device__ OCTRACE_FORCE_INLINE unsigned reduce_add(unsigned x) {
+  for (unsigned step = 1; step < kWarp; step *= 2) x += __shfl_xor_sync(kAllLanes, x, step);
+  return x;
+}
+#endif
+
+// The n-th of the lanes that are set in `lanes`, counted below this one.
+__device__ OCTRACE_FORCE_INLINE unsigned rank(unsigned lanes, unsigned lane) {
+  return __popc(lanes & ((1u << lane) - 1u));
+}
+
+// Four bits to four bytes of 0 or 0xff.
+__device__ OCTRACE_FORCE_INLINE std::uint32_t spread_bits(std::uint32_t bits) {
+  return ((bits * 0x00204081u) & 0x01010101u) * 0xffu;
+}
+
+// Of the meta bytes of four children, one bit for each triangle.
+__device__ OCTRACE_FORCE_INLINE std::uint32_t triangle_bits(std::uint32_t meta) {
+  return meta & 0xe0e0e0e0u;
+}
+
+__device__ OCTRACE_FORCE_INLINE unsigned count_triangles(const uint4& record) {
+  return __popc(triangle_bits(record.y)) + __popc(triangle_bits(record.z));
+}
+
+// The k-th triangle of a record.
+__device__ OCTRACE_FORCE_INLINE std::uint32_t triangle_of(const uint4& record, unsigned k) {
+  std::uint32_t meta = record.y, bits = triangle_bits(record.y);
+  const unsigned lower = __popc(bits);
+  if (k >= lower) {
+    k -= lower;
+    meta = record.z;
+    bits = triangle_bits(record.z);
+  }
+  for (; k != 0; --k) bits &= bits - 1;
+  const unsigned bit = static_cast<unsigned>(lowest_bit(bits));
+  return record.x + ((meta >> (bit & 24u)) & 31u) + (bit & 7u) - 5u;
+}
+
+// The queue's state, the same in all lanes.
+struct Queue {
+  unsigned first = 0;    // of the ring
+  unsigned records = 0;  // at most kWarp between node steps
+  unsigned skipped = 0;  // triangles of the first record that were tested already
+  unsigned pairs = 0;    // triangles that wait
+};
+
+// Takes the first `count` pairs, one for each lane below count, and returns that lane's: record and
+// number of the triangle in it. count: the lesser of kWarp and queue.pairs.
+__device__ OCTRACE_FORCE_INLINE uint4 take_pair(WarpShared& shared, Queue& queue, unsigned lane,
+                                                unsigned count, unsigned* number) {
+  __syncwarp();
+  unsigned triangles = 0;
+  if (lane < queue.records) {
+    triangles = count_triangles(shared.queue[(queue.first + lane) % (2 * kWarp)]);
+  }
+  if (lane == 0) triangles -= queue.skipped;
+  unsigned end = triangles;
+#pragma unroll
+  for (unsigned step = 1; step < kWarp; step *= 2) {
+    const unsigned below = __shfl_up_sync(kAllLanes, end, step);
+    if (lane >= step) end += below;
+  }
+  const unsigned start = end - triangles;
+  // Bit i: a record's first pair goes to lane i.
+  const unsigned starts = reduce_or(triangles != 0 && start < kWarp ? 1u << start : 0u);
+  const unsigned mine = starts & (kAllLanes >> (kWarp - 1 - lane));
+  const unsigned record = __popc(mine) - 1;
+  *number = lane - static_cast<unsigned>(highest_bit(mine)) + (record == 0 ? queue.skipped : 0);
+  const uint4 taken = shared.queue[(queue.first + record) % (2 * kWarp)];
+  const unsigned last = __popc(starts) - 1;
+  const unsigned ended = __ballot_sync(kAllLanes, lane <= last && end <= count);
+  const unsigned done = __popc(ended);
+  const unsigned left = count - static_cast<unsigned>(highest_bit(starts));
+  queue.skipped = done > last ? 0 : left + (last == 0 ? queue.skipped : 0);
+  queue.first += done;
+  queue.records -= done;
+  queue.pairs -= count;
+  return taken;
+}
+
+// Tests the first pairs of the queue, one a lane.
 template <bool kAnyHit, bool kAlpha>
 __device__ OCTRACE_FORCE_INLINE void test_pairs(const SceneView& scene, const RenderParams& params,
-                                                WarpShared& shared, unsigned lane, unsigned first,
-                                                unsigned count) {
-  __syncwarp();
+                                                WarpShared& shared, Queue& queue, unsigned lane) {
+  const unsigned count = min(queue.pairs, kWarp);
+  unsigned number;
+  const uint4 record = take_pair(shared, queue, lane, count, &number);
   bool found = false;
-  unsigned owner = 0;
+  const unsigned owner = record.w;
   TriangleHit hit;
   unsigned long long key = 0;
   std::uint32_t index = 0;
   if (lane < count) {
-    const uint2 pair = shared.queue[(first + lane) % (2 * kWarp)];
-    owner = pair.y;
-    const LeafTriangle triangle = load(scene.octree.triangles[pair.x]);
+    const LeafTriangle triangle = load(scene.octree.triangles[triangle_of(record, number)]);
     const float4 r0 = shared.ray[0][owner], r1 = shared.ray[1][owner], r2 = shared.ray[2][owner],
                  r3 = shared.ray[3][owner];
     const SlabRay slab_ray{Vec3(r0.x, r0.y, r0.z), 0, Vec3(r3.x, r3.y, r3.z)};
@@ -108,11 +207,6 @@ __device__ OCTRACE_FORCE_INLINE void test_pairs(const SceneView& scene, const Re
   }
 }
 
-// The n-th of the lanes that are set in `lanes`, counted below this one.
-__device__ OCTRACE_FORCE_INLINE unsigned rank(unsigned lanes, unsigned lane) {
-  return __popc(lanes & ((1u << lane) - 1u));
-}
-
 // One atomic for all idle lanes of a warp.
 __device__ OCTRACE_FORCE_INLINE std::uint64_t take_rays(unsigned idle, unsigned lane,
                                                         unsigned long long* next) {
@@ -127,19 +221,28 @@ __device__ OCTRACE_FORCE_INLINE std::uint64_t take_rays(unsigned idle, unsigned 
 template <bool kAnyHit, int kRefill, class Source>
 __device__ OCTRACE_FORCE_INLINE void trace_rays(const SceneView& scene, const RenderParams& params,
                                                 const Source& source, WarpShared& shared,
-                                                const VisitOrder& visit_order, Report* report) {
+                                                const BlockShared& block, Report* report) {
   const unsigned lane = threadIdx.x % kWarp;
   BoxRay ray;
-  float tmin = 0.0f, tmax = 0.0f;
+  float tmax = 0.0f;
   WalkStack stack;
   WalkGroup group{0, 0};
   int depth = 0;
   std::uint32_t budget = 0;
   bool live = false, holds = false, more = true;
-  unsigned first_pair = 0, pairs = 0;
+  Queue queue;
+  const std::uint32_t byte_bias = block.byte_bias;
   const auto fail = [&](TraceStatus status) {
     report_failure(report, status, static_cast<std::uint32_t>(shared.index[lane]), 0);
     live = false;
+  };
+  const auto test = [&] {
+    test_pairs<kAnyHit, Source::kAlpha>(scene, params, shared, queue, lane);
+    if constexpr (kAnyHit) {
+      if (shared.blocked >> lane & 1u) live = false;
+    } else {
+      tmax = __uint_as_float(static_cast<std::uint32_t>(shared.best[lane] >> 32));
+    }
   };
   if (kAnyHit && lane == 0) shared.blocked = 0;
   __syncwarp();
@@ -169,7 +272,6 @@ __device__ OCTRACE_FORCE_INLINE void trace_rays(const SceneView& scene, const Re
         const SlabRay slab_ray = make_slab_ray(from);
         publish(shared, lane, from, slab_ray);
         if (!scene.octree.nodes.empty()) ray = make_box_ray(slab_ray, scene.octree.nodes.data);
-        tmin = from.tmin;
         tmax = from.tmax;
         // The root, as the child in slot 0 of nothing.
         group = {0, (1u << (24 + (ray.octant ^ 7u))) | 1u};
@@ -184,13 +286,13 @@ __device__ OCTRACE_FORCE_INLINE void trace_rays(const SceneView& scene, const Re
     if (!__any_sync(kAllLanes, holds)) return;
     const int refill = more ? kRefill : 1;
     while (__popc(living) >= refill) {
-      std::uint32_t first_triangle = 0, triangles = 0;
+      uint4 found = make_uint4(0, 0, 0, lane);
       if (live) {
         const int bit = highest_bit(group.pending);
         const std::uint32_t slot = (static_cast<std::uint32_t>(bit) ^ ray.octant ^ 7u) & 7u;
         const std::uint32_t before = group.pending & 0xffu & ((1u << slot) - 1u);
         const ChildMask children = ChildTest::test(
-            scene.octree.nodes[group.first_child + count_bits(before)], ray, tmin, tmax);
+            scene.octree.nodes[group.first_child + count_bits(before)], ray, tmax, byte_bias);
         group.pending &= ~(1u << bit);
         const std::uint32_t inner = children.hit & children.inner_mask;
         if (inner != 0) {
@@ -201,9 +303,9 @@ __device__ OCTRACE_FORCE_INLINE void trace_rays(const SceneView& scene, const Re
               stack[depth++] = group;
             }
           }
-          group = {children.first_child,
-                   static_cast<std::uint32_t>(visit_order.order[ray.octant][inner]) << 24 |
-                       children.inner_mask};
+          group = {children.first_child, static_cast<std::uint32_t>(block.order[ray.octant][inner])
+                                                 << 24 |
+                                             children.inner_mask};
         } else if (!(group.pending & kInnerBits)) {
           if (depth == 0) {
             live = false;
@@ -212,50 +314,24 @@ __device__ OCTRACE_FORCE_INLINE void trace_rays(const SceneView& scene, const Re
           }
         }
         if (--budget == 0 && live) fail(TraceStatus::step_budget);
-        first_triangle = children.first_triangle;
-        for (std::uint32_t leaves = children.hit & ~children.inner_mask; leaves != 0;
-             leaves &= leaves - 1) {
-          const std::uint32_t meta =
-              __byte_perm(children.meta[0], children.meta[1], lowest_bit(leaves)) & 0xffu;
-          triangles |= (meta >> 5) << (meta & 31u);
-        }
+        const std::uint32_t leaves = children.hit & ~children.inner_mask;
+        found.x = children.first_triangle;
+        found.y = children.meta[0] & spread_bits(leaves & 15u);
+        found.z = children.meta[1] & spread_bits(leaves >> 4);
       }
-      for (;;) {
-        const unsigned having = __ballot_sync(kAllLanes, triangles != 0);
-        if (having == 0) break;
-        if (triangles != 0) {
-          const unsigned at = first_pair + pairs + rank(having, lane);
-          shared.queue[at % (2 * kWarp)] =
-              make_uint2(first_triangle + static_cast<unsigned>(lowest_bit(triangles)), lane);
-          triangles &= triangles - 1;
+      const unsigned finders = __ballot_sync(kAllLanes, (found.y | found.z) != 0);
+      if (finders != 0) {
+        if ((found.y | found.z) != 0) {
+          shared.queue[(queue.first + queue.records + rank(finders, lane)) % (2 * kWarp)] = found;
         }
-        pairs += __popc(having);
-        if (pairs >= kWarp) {
-          test_pairs<kAnyHit, Source::kAlpha>(scene, params, shared, lane, first_pair, kWarp);
-          pairs -= kWarp;
-          first_pair += kWarp;
-          if constexpr (kAnyHit) {
-            if (shared.blocked >> lane & 1u) {
-              live = false;
-              triangles = 0;
-            }
-          } else {
-            tmax = __uint_as_float(static_cast<std::uint32_t>(shared.best[lane] >> 32));
-          }
-        }
+        queue.records += __popc(finders);
+        queue.pairs += reduce_add(count_triangles(found));
+        while (queue.pairs >= kWarp) test();
       }
       living = __ballot_sync(kAllLanes, live);
     }
-    if (pairs != 0) {
-      test_pairs<kAnyHit, Source::kAlpha>(scene, params, shared, lane, first_pair, pairs);
-      first_pair += pairs;
-      pairs = 0;
-      if constexpr (kAnyHit) {
-        if (shared.blocked >> lane & 1u) live = false;
-      } else {
-        tmax = __uint_as_float(static_cast<std::uint32_t>(shared.best[lane] >> 32));
-      }
-    }
+    // A second copy of the test: one loop with both conditions was 6 % slower.
+    if (queue.pairs != 0) test();
   }
 }
 
