@@ -35,6 +35,8 @@ install(TARGETS octrace octrace_image_module RUNTIME_DEPENDENCY_SET octrace_depe
   RUNTIME DESTINATION bin COMPONENT octrace
   LIBRARY DESTINATION lib COMPONENT octrace)
 octrace_install_dependencies(octrace_dependencies bundle)
+install(FILES ${CMAKE_SOURCE_DIR}/backend/batch/job.schema.json
+  DESTINATION share/octrace COMPONENT octrace)
 foreach(document README.md LICENSE SECURITY.md)
   install(FILES ${CMAKE_SOURCE_DIR}/${document} DESTINATION ${CMAKE_INSTALL_DOCDIR}
     COMPONENT octrace OPTIONAL)

@@ -36,6 +36,11 @@ std::size_t most_framebuffers(const Plan& plan, unsigned threads) {
       std::clamp<std::uint64_t>(fitting, 2, std::uint64_t{threads} + 2));
 }
 
+// zlib's level 1, as a single render has it: level 4 takes longer and saves little.
+std::string codec(const std::string& compression) {
+  return compression.starts_with("zip") ? compression + ":1" : compression;
+}
+
 ordered_json error_json(const util::Error& error) {
   return {{"exit", static_cast<int>(error.exit)},
           {"code", error.code},
@@ -158,15 +163,20 @@ void ViewWriter::write(TracedView& view) {
 
 Result<ordered_json> ViewWriter::write_files(const TracedView& view) const {
   const Metadata metadata = view_metadata(plan_.job().scenes[view.view.scene].source, view.camera);
+  // The image library takes the codec as an attribute, which goes before the writer's own choice.
+  Metadata exr_metadata = metadata;
+  exr_metadata.emplace_back("compression", codec(plan_.job().compression));
   ordered_json files = ordered_json::array();
   for (const Output& file : plan_.files(view.view)) {
-    auto written = write_output(file, *view.framebuffer, plan_.job().depth_scale, metadata);
+    auto written = write_output(file, *view.framebuffer, plan_.job().depth_scale,
+                                file.kind == FileKind::exr ? exr_metadata : metadata);
     if (!written && written.error().exit == util::Exit::io &&
         !std::filesystem::exists(std::filesystem::path(file.path).parent_path())) {
       // The first file of its folder.
       const std::string folder = file.path.substr(0, file.path.rfind('/') + 1);
       if (auto made = make_folder(folder); !made) return made.error();
-      written = write_output(file, *view.framebuffer, plan_.job().depth_scale, metadata);
+      written = write_output(file, *view.framebuffer, plan_.job().depth_scale,
+                             file.kind == FileKind::exr ? exr_metadata : metadata);
     }
     if (!written) return written.error();
     std::error_code error;

@@ -1,0 +1,213 @@
+#!/usr/bin/env python3
+"""Measures `octrace batch`: views a second and where the time goes, memory over many views, and Blender
+beside it on the same views.
+
+    tests/bench/batch_bench.py [--octrace PROGRAM] [--views 1000] [--memory 10000] [--blender] [--kill 30]
+"""
+import argparse
+import hashlib
+import json
+import os
+import random
+import shutil
+import subprocess
+import tempfile
+import time
+
+SCENE = "builtin:terrain:224"  # 100,352 triangles
+PLANES = ["Z", "mask", "object_id"]
+
+BLENDER = """
+import bpy, json, mathutils, sys
+poses = json.loads(sys.argv[sys.argv.index("--") + 2])
+bpy.ops.wm.read_factory_settings(use_empty=True)
+bpy.ops.import_scene.gltf(filepath=sys.argv[sys.argv.index("--") + 1])
+scene = bpy.context.scene
+scene.render.engine = "CYCLES"
+scene.cycles.samples = 1
+scene.cycles.use_denoising = False
+scene.cycles.max_bounces = 0
+scene.render.use_persistent_data = True
+scene.render.resolution_x, scene.render.resolution_y = 640, 480
+scene.render.resolution_percentage = 100
+layer = scene.view_layers[0]
+layer.use_pass_z = layer.use_pass_object_index = True
+scene.render.image_settings.file_format = "OPEN_EXR_MULTILAYER"
+scene.render.image_settings.color_depth = "32"
+camera = bpy.data.objects.new("c", bpy.data.cameras.new("c"))
+scene.collection.objects.link(camera)
+scene.camera = camera
+camera.data.sensor_fit = "VERTICAL"
+turn = mathutils.Matrix(((1, 0, 0, 0), (0, 0, -1, 0), (0, 1, 0, 0), (0, 0, 0, 1)))  # +Y up to +Z up
+for i, (matrix, yfov) in enumerate(poses):
+    camera.data.angle = yfov
+    camera.matrix_world = turn @ mathutils.Matrix([matrix[r::4] for r in range(4)])
+    scene.render.filepath = sys.argv[sys.argv.index("--") + 3] + "%d.exr" % i
+    bpy.ops.render.render(write_still=True)
+"""
+
+
+def write_job(folder, views, output, size=(640, 480), **members):
+    job = {"version": 1, "scenes": [SCENE], "size": list(size), "aovs": PLANES, "output": output,
+           "cameras": [{"turntable": {"n": views, "elevation": 20}}], "device": "cpu", **members}
+    path = os.path.join(folder, "job.json")
+    with open(path, "w") as file:
+        json.dump(job, file)
+    return path
+
+
+def run(arguments, job, *more):
+    started = time.monotonic()
+    subprocess.run([arguments.octrace, "batch", job, "--force", "--quiet", *more], check=True)
+    return time.monotonic() - started
+
+
+def summary(folder):
+    with open(os.path.join(folder, "out", "summary.json")) as file:
+        return json.load(file)
+
+
+def throughput(arguments, folder):
+    cases = [("EXR, " + c, {"output": "out/{camera}.exr", "compression": c})
+             for c in ("zip", "zips", "rle", "piz", "none")]
+    cases += [("PNG, one a plane", {"output": "out/{camera}_{aov}.png"}),
+              ("NPZ", {"output": "out/{camera}.npz"})]
+    for name, members in cases:
+        shutil.rmtree(os.path.join(folder, "out"), True)
+        job = write_job(folder, arguments.views, **members)
+        seconds = run(arguments, job)
+        told = summary(folder)
+        n = told["done"]
+        size = sum(f["bytes"] for line in open(os.path.join(folder, "out/.octrace/journal-1-of-1.ndjson"))
+                   for f in json.loads(line).get("files", [])) / n
+        ms = told["ms"]
+        print("%-18s %6.1f views/s, process %.1f s; a view: trace %.1f ms, encode and write %.1f ms, "
+              "waited %.1f ms; load %.0f ms; %.0f kB" %
+              (name, told["views_per_s"], seconds, ms["trace"] / n, ms["encode_and_write"] / n,
+               ms["wait_for_writers"] / n, ms["load"], size / 1e3), flush=True)
+
+
+def resident(pid):
+    with open("/proc/%d/status" % pid) as file:
+        for line in file:
+            if line.startswith("VmRSS"):
+                return int(line.split()[1])
+
+
+def memory(arguments, folder):
+    shutil.rmtree(os.path.join(folder, "out"), True)
+    job = write_job(folder, arguments.memory, "out/{camera}.exr", (48, 32))
+    journal = os.path.join(folder, "out/.octrace/journal-1-of-1.ndjson")
+    process = subprocess.Popen([arguments.octrace, "batch", job, "--quiet"])
+    marks, seen, position = {}, 0, 0
+    while process.poll() is None:
+        time.sleep(0.01)
+        if os.path.exists(journal):
+            with open(journal, "rb") as file:
+                file.seek(position)
+                text = file.read()
+                position += len(text)
+                seen += text.count(b'{"kind":"view"')
+        for mark in (100, 1000, arguments.memory - 20):
+            if seen >= mark and mark not in marks:
+                try:
+                    marks[mark] = (seen, resident(process.pid))
+                except (OSError, TypeError):
+                    pass
+    print("resident: " + ", ".join("%s kB after view %d" % (rss, at) for at, rss in marks.values()))
+    values = [value[1] for value in marks.values() if value[1]]
+    if len(values) > 1:
+        print("last / first: %.4f" % (values[-1] / values[0]))
+
+
+def hashes(folder):
+    found = {}
+    for place, _, names in os.walk(folder):
+        for name in names:
+            if name.endswith(".exr"):
+                with open(os.path.join(place, name), "rb") as file:
+                    found[name] = hashlib.sha256(file.read()).hexdigest()
+    return found
+
+
+def kill(arguments, folder):
+    out = os.path.join(folder, "out")
+    job = write_job(folder, 50, "out/{camera}.exr")
+    shutil.rmtree(out, True)
+    length = run(arguments, job)
+    expected = hashes(out)
+    rng = random.Random(arguments.seed)
+    twice = 0
+    for attempt in range(arguments.kill):
+        shutil.rmtree(out)
+        process = subprocess.Popen([arguments.octrace, "batch", job, "--quiet"])
+        time.sleep(rng.uniform(0.0, length))
+        process.kill()
+        process.wait()
+        left = [n for _, _, names in os.walk(out) for n in names if ".octrace-" in n]
+        subprocess.run([arguments.octrace, "batch", job, "--quiet"], check=True)
+        again = [n for _, _, names in os.walk(out) for n in names if ".octrace-" in n]
+        with open(os.path.join(out, ".octrace/journal-1-of-1.ndjson")) as file:
+            views = [json.loads(line).get("view") for line in file if '"kind":"view"' in line]
+        assert hashes(out) == expected and not again, (attempt, again)
+        assert sorted(views) == list(range(50)), attempt
+        twice += len(left)
+    print("%d kills (seed %d): every output as without; %d temporary files found and removed, 0 left" %
+          (arguments.kill, arguments.seed, twice))
+
+
+def blender(arguments, folder):
+    job = write_job(folder, 10, "out/{camera}.exr")
+    shutil.rmtree(os.path.join(folder, "out"), True)
+    times = sorted(run(arguments, job) for _ in range(3))
+    poses = []
+    with open(os.path.join(folder, "out/.octrace/journal-1-of-1.ndjson")) as file:
+        for line in map(json.loads, file):
+            if line["kind"] == "view":
+                poses.append((line["lens"]["matrix"], line["lens"]["yfov"]))
+    subprocess.run([arguments.octrace, "export", SCENE, "--to", "gltf", "-o", folder + "/glb"],
+                   check=True, stdout=subprocess.DEVNULL)
+    glb = [os.path.join(folder, "glb", n) for n in os.listdir(folder + "/glb") if n.endswith(".glb")][0]
+    script = os.path.join(folder, "views.py")
+    with open(script, "w") as file:
+        file.write(BLENDER)
+
+    def start(views):
+        started = time.monotonic()
+        subprocess.run(["blender", "-b", "--factory-startup", "-noaudio", "--python-exit-code", "3",
+                        "-P", script, "--", glb, json.dumps(views), folder + "/b"], check=True,
+                       stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        return time.monotonic() - started
+
+    together = start(poses)
+    apart = sum(start([pose]) for pose in poses[:3]) / 3 * len(poses)
+    print("ten views: octrace %.2f s (median of 3 processes); Blender in one process %.1f s (%.0f x), "
+          "in one process a view %.1f s (%.0f x; three measured)" %
+          (times[1], together, together / times[1], apart, apart / times[1]))
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--octrace", default="build/release/bin/octrace")
+    parser.add_argument("--views", type=int, default=1000, help="of the throughput; 0: none")
+    parser.add_argument("--memory", type=int, default=10000, help="views; 0: none")
+    parser.add_argument("--kill", type=int, default=0, help="kill -9 a 50-view job so many times")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--blender", action="store_true")
+    arguments = parser.parse_args()
+    arguments.octrace = os.path.abspath(arguments.octrace)
+    folder = tempfile.mkdtemp(prefix="octrace_bench_")
+    try:
+        if arguments.views:
+            throughput(arguments, folder)
+        if arguments.memory:
+            memory(arguments, folder)
+        if arguments.kill:
+            kill(arguments, folder)
+        if arguments.blender:
+            blender(arguments, folder)
+    finally:
+        shutil.rmtree(folder, True)
+
+
+main()
