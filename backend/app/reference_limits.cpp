@@ -90,6 +90,15 @@ util::Result<ReferenceLimits> blender_limits(const batch::SceneRequest& request,
           fmt::format("Blender 3.4's importer refuses files that require {}", extension));
     }
   }
+  if (!request.variant.empty()) {
+    limits.shown_otherwise.emplace_back(
+        "Blender's importer gives every mesh its own materials, not those of --variant");
+  }
+  const auto visible = [](const tinygltf::Node& node) { return gltf::node_visible(node); };
+  if (!std::all_of(document->model.nodes.begin(), document->model.nodes.end(), visible)) {
+    limits.shown_otherwise.emplace_back(
+        "Blender's importer shows the nodes that KHR_node_visibility hides");
+  }
   for (std::size_t i = 0; i < document->model.nodes.size(); ++i) {
     if (!shears(document->model.nodes[i].matrix)) continue;
     limits.shown_otherwise.push_back(fmt::format(
