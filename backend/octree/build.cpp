@@ -86,6 +86,12 @@ std::uint64_t build_bytes(std::uint64_t triangles) {
                       sizeof(kernels::Node) / 4);
 }
 
+BuildInput input_of(const scene::Scene& scene, std::span<const std::uint32_t> flags) {
+  return {scene.positions, scene.triangles, scene.triangle_geometry, flags};
+}
+
+}  // namespace
+
 std::vector<std::uint32_t> geometry_flags(const scene::Scene& scene) {
   std::vector<std::uint32_t> flags;
   flags.reserve(scene.geometries.size());
@@ -97,12 +103,6 @@ std::vector<std::uint32_t> geometry_flags(const scene::Scene& scene) {
   }
   return flags;
 }
-
-BuildInput input_of(const scene::Scene& scene, std::span<const std::uint32_t> flags) {
-  return {scene.positions, scene.triangles, scene.triangle_geometry, flags};
-}
-
-}  // namespace
 
 util::Result<Octree> build(const BuildInput& input, const BuildOptions& options) {
   const std::uint64_t needed = build_bytes(input.triangles.size());

@@ -50,6 +50,9 @@ struct BuildInput {
   std::span<const std::uint32_t> flags;  // by geometry
 };
 
+// kCullBack and so on of each geometry, from its material.
+std::vector<std::uint32_t> geometry_flags(const scene::Scene& scene);
+
 util::Result<Octree> build(const BuildInput& input, const BuildOptions& options);
 util::Result<Octree> build(const scene::Scene& scene, const BuildOptions& options);
 

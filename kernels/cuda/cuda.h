@@ -7,6 +7,7 @@
 #include "kernels/aov.h"
 #include "kernels/camera.h"
 #include "kernels/motion.h"
+#include "kernels/node.h"
 #include "kernels/ray.h"
 #include "kernels/render_params.h"
 #include "kernels/scene_view.h"
@@ -98,5 +99,31 @@ struct SeedImage {
 };
 Status launch_seed(const SeedImage& image, std::uint32_t rows_a_launch, Report* report,
                    Stream stream);
+
+// The octree built on the device, by clustering along a Morton curve (H-PLOC). All pointers are
+// device memory; corner indices have been checked. flags and triangle_geometry may be empty, as in
+// octree::BuildInput.
+struct BuildScene {
+  Span<Vec3> positions;
+  Span<Triangle> triangles;  // at least one, fewer than 2^31
+  Span<std::uint32_t> triangle_geometry;
+  Span<std::uint32_t> flags;
+};
+enum class BuildFailure : std::uint32_t { none, too_many_nodes, too_deep };
+struct BuildReport {
+  std::uint32_t nodes, triangles;
+  BuildFailure failure;
+};
+struct BuildTarget {
+  Node* nodes;
+  std::uint32_t node_capacity;  // build_node_capacity() always suffices
+  LeafTriangle* triangles;      // as many as the scene has
+  BuildReport* report;
+};
+std::uint64_t build_node_capacity(std::uint64_t triangles);
+std::uint64_t build_scratch_bytes(std::uint64_t triangles);
+// scratch: build_scratch_bytes() bytes, aligned to 256.
+Status launch_build(const BuildScene& scene, void* scratch, const BuildTarget& target,
+                    Stream stream);
 
 }  // namespace octrace::kernels::cuda

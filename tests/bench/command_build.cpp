@@ -5,6 +5,7 @@
 
 #include "backend/octree/octree.h"
 #include "tests/bench/bench_scene.h"
+#include "tests/bench/build_gpu.h"
 #include "tests/bench/commands.h"
 #include "tests/bench/embree_peer.h"
 #include "tests/bench/statistics.h"
@@ -19,6 +20,7 @@ struct Options {
   bool peer = false;
   unsigned threads = 1;
   int repeats = 5;
+  int gpu = -1;
 };
 
 struct Measurement {
@@ -82,6 +84,11 @@ int run(const Options& options) {
       all[3].seconds.push_back(
           EmbreePeer(*scene, EmbreePeer::Quality::high, options.threads).build_seconds());
     }
+    if (options.gpu >= 0) {
+      util::Result<GpuBuild> built = build_on_gpu(*scene, options.gpu, options.repeats);
+      if (!built) return fail(built.error());
+      all.push_back({"octrace hploc", built->seconds, octree::statistics(built->octree)});
+    }
     for (const Measurement& m : all) {
       rows.push_back(row_of(name.substr(name.find_last_of('/') + 1), scene->triangles.size(),
                             options.threads, m));
@@ -100,6 +107,8 @@ void add_build_command(CLI::App& app, int& exit_code) {
   command->add_option("--threads", options->threads, "CPU threads")
       ->check(CLI::Range(1u, 4096u))
       ->capture_default_str();
+  command->add_option("--gpu", options->gpu, "Build on this GPU as well")
+      ->check(CLI::Range(0, 1023));
   command->add_option("--repeats", options->repeats, "Timed runs a row")
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();

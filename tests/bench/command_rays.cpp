@@ -9,6 +9,7 @@
 
 #include "backend/render/device.h"
 #include "tests/bench/bench_scene.h"
+#include "tests/bench/build_gpu.h"
 #include "tests/bench/commands.h"
 #include "tests/bench/embree_peer.h"
 #include "tests/bench/hits.h"
@@ -210,6 +211,18 @@ class SceneBench {
   std::unique_ptr<RayGpu> gpu_;
 };
 
+util::Result<octree::Octree> build(const Options& options, const scene::Scene& scene,
+                                   const render::DeviceChoice& device) {
+  if (options.builder == "hploc") {
+    util::Result<GpuBuild> built = build_on_gpu(scene, device.index, 1);
+    if (!built) return built.error();
+    return std::move(built->octree);
+  }
+  octree::BuildOptions build;
+  build.builder = options.builder == "median" ? octree::Builder::median : octree::Builder::sah;
+  return octree::build(scene, build);
+}
+
 int run(const Options& options) {
   int width = 0, height = 0;
   if (!parse_size(options.size, &width, &height)) return 2;
@@ -233,9 +246,7 @@ int run(const Options& options) {
     util::Result<scene::Camera> camera =
         choose_camera(*scene, options.camera, double(width) / height);
     if (!camera) return fail(camera.error());
-    octree::BuildOptions build;
-    build.builder = options.builder == "median" ? octree::Builder::median : octree::Builder::sah;
-    util::Result<octree::Octree> octree = octree::build(*scene, build);
+    util::Result<octree::Octree> octree = build(options, *scene, *device);
     if (!octree) return fail(octree.error());
     SceneBench bench(options, name.substr(name.find_last_of('/') + 1), std::move(*scene),
                      std::move(*octree));
@@ -266,7 +277,7 @@ void add_rays_command(CLI::App& app, int& exit_code) {
       ->check(CLI::Range(1u, 4096u))
       ->capture_default_str();
   command->add_option("--builder", options->builder, "Octree builder")
-      ->check(CLI::IsMember({"median", "sah"}))
+      ->check(CLI::IsMember({"hploc", "median", "sah"}))
       ->capture_default_str();
   command->add_option("--repeats", options->repeats, "Timed runs a row")
       ->check(CLI::Range(1, 1000))
