@@ -18,7 +18,9 @@ SCENE = "builtin:terrain:224"  # 100,352 triangles
 PLANES = ["Z", "mask", "object_id"]
 
 BLENDER = """
-import bpy, json, mathutils, sys
+import bpy, json, mathutils, numpy, sys
+if not hasattr(numpy, "bool"):
+    numpy.bool = bool  # add-ons of Blender 3.4 ask for a name that NumPy 1.24 removed
 poses = json.loads(sys.argv[sys.argv.index("--") + 2])
 bpy.ops.wm.read_factory_settings(use_empty=True)
 bpy.ops.import_scene.gltf(filepath=sys.argv[sys.argv.index("--") + 1])
