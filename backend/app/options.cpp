@@ -67,12 +67,15 @@ void add_scene_options(CLI::App& command, SceneRequest& request) {
 void add_tuning_options(CLI::App& command, octree::BuildOptions& build, bool& verify) {
   add_choice<octree::Builder>(
       command, "--builder", build.builder,
-      {{"median", octree::Builder::median}, {"sah", octree::Builder::sah}},
-      "sah: surface-area heuristic; median: the paper's. Never changes the image [sah]")
+      {{"median", octree::Builder::median},
+       {"sah", octree::Builder::sah},
+       {"quality", octree::Builder::quality}},
+      "sah: surface-area heuristic; quality: slower, for fewer tests a ray; median: the paper's. "
+      "Never changes the image [sah]")
       ->group(kTuning);
   command
       .add_option("--leaf", build.leaf,
-                  "most vertices (median) or triangles (sah) in a leaf [8, 3]")
+                  "most vertices (median) or triangles (others) in a leaf [8, 3]")
       ->check(CLI::Range(1, 1 << 20).description(""))
       ->type_name("N")
       ->group(kTuning);

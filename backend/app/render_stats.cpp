@@ -47,7 +47,7 @@ util::Result<void> write_stats(const std::string& path, const RenderStats& stats
                 {"write", stats.write_ms},
                 {"total", stats.total.milliseconds()}};
   json["octree"] = octree_json(octree::statistics(session.octree));
-  json["octree"]["builder"] = stats.builder == octree::Builder::sah ? "sah" : "median";
+  json["octree"]["builder"] = octree::name_of(stats.builder);
   json["peak_rss_bytes"] = util::peak_resident_bytes();
   return util::write_file(path, json.dump(2) + "\n");
 }

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "backend/octree/builders.h"
+#include "backend/octree/leaf_triangle.h"
 #include "backend/octree/octree.h"
 #include "backend/octree/tree.h"
 
@@ -38,7 +39,7 @@ class Layout {
     node.first_triangle = triangle;
     for (int slot = 0; slot < kernels::kChildren; ++slot) {
       for (std::uint32_t i = 0; i < tree.leaf_count[slot]; ++i) {
-        octree_.triangles[triangle++] = leaf_triangle(ids_[tree.leaf_first[slot] + i]);
+        octree_.triangles[triangle++] = leaf_triangle(input_, ids_[tree.leaf_first[slot] + i]);
       }
     }
     struct Job {
@@ -65,25 +66,19 @@ class Layout {
     }
   }
 
-  kernels::LeafTriangle leaf_triangle(std::uint32_t id) const {
-    const kernels::Triangle& t = input_.triangles[id];
-    const std::uint32_t geometry =
-        input_.triangle_geometry.empty() ? 0 : input_.triangle_geometry[id];
-    const std::uint32_t flags = input_.flags.empty() ? 0 : input_.flags[geometry];
-    return {input_.positions[t.a], id,      input_.positions[t.b], flags,
-            input_.positions[t.c], geometry};
-  }
-
   const BuildInput& input_;
   std::span<const std::uint32_t> ids_;
   Octree& octree_;
 };
 
 // Sizes of the largest arrays alive at once while building; an upper estimate.
-std::uint64_t build_bytes(std::uint64_t triangles) {
-  constexpr std::uint64_t kReference = 32, kTreeNodes = sizeof(TreeNode) / 4, kId = 4;
-  return triangles * (kReference + kTreeNodes + kId + sizeof(kernels::LeafTriangle) +
-                      sizeof(kernels::Node) / 4);
+std::uint64_t build_bytes(std::uint64_t triangles, Builder builder) {
+  if (builder == Builder::median) {
+    constexpr std::uint64_t kReference = 32, kTreeNodes = sizeof(TreeNode) / 4, kId = 4;
+    return triangles * (kReference + kTreeNodes + kId + sizeof(kernels::LeafTriangle) +
+                        sizeof(kernels::Node) / 4);
+  }
+  return sah_build_bytes(triangles, builder == Builder::quality);
 }
 
 BuildInput input_of(const scene::Scene& scene, std::span<const std::uint32_t> flags) {
@@ -104,8 +99,20 @@ std::vector<std::uint32_t> geometry_flags(const scene::Scene& scene) {
   return flags;
 }
 
+const char* name_of(Builder builder) {
+  switch (builder) {
+    case Builder::median:
+      return "median";
+    case Builder::sah:
+      return "sah";
+    case Builder::quality:
+      return "quality";
+  }
+  return "";
+}
+
 util::Result<Octree> build(const BuildInput& input, const BuildOptions& options) {
-  const std::uint64_t needed = build_bytes(input.triangles.size());
+  const std::uint64_t needed = build_bytes(input.triangles.size(), options.builder);
   if (input.triangles.size() > 0x7fffffffu || needed > options.max_bytes) {
     return util::Error{util::Exit::limit, "",
                        fmt::format("the octree of {} triangles needs about {} bytes while it is "
@@ -115,16 +122,16 @@ util::Result<Octree> build(const BuildInput& input, const BuildOptions& options)
   }
   Octree octree;
   const auto run = [&] {
+    if (options.builder != Builder::median) {
+      constexpr std::uint32_t kMost = kernels::kMaxLeafTriangles;
+      build_sah(input, options.leaf == 0 ? kMost : std::min(options.leaf, kMost),
+                options.builder == Builder::quality, octree);
+      return;
+    }
     TreeArena arena;
     std::vector<std::uint32_t> ids;
-    TreeNode* root = nullptr;
-    if (options.builder == Builder::median) {
-      root = build_median(input, options.leaf == 0 ? kPaperLeaf : options.leaf, arena, ids);
-    } else {
-      constexpr std::uint32_t kMost = kernels::kMaxLeafTriangles;
-      root =
-          build_sah(input, options.leaf == 0 ? kMost : std::min(options.leaf, kMost), arena, ids);
-    }
+    const TreeNode* root =
+        build_median(input, options.leaf == 0 ? kPaperLeaf : options.leaf, arena, ids);
     if (root != nullptr) Layout(input, ids, octree).write(*root);
   };
   if (options.threads == 0) {

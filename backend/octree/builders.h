@@ -1,5 +1,4 @@
-// The builders behind octree::build(). Each sorts `ids` (the triangles' indices) so that leaves are
-// runs of it, and returns the root; null where there is no triangle.
+// The builders behind octree::build().
 #pragma once
 
 #include <cstdint>
@@ -10,13 +9,17 @@
 
 namespace octrace::octree {
 
-// The seed paper's octree (Wang, Ren, Zhao, Sun 2012): median splits of the vertices.
+// The seed paper's octree (Wang, Ren, Zhao, Sun 2012): median splits of the vertices. Sorts `ids`
+// (the triangles' indices) so that leaves are runs of it, and returns the root; null where there is
+// no triangle.
 TreeNode* build_median(const BuildInput& input, std::uint32_t leaf_vertices, TreeArena& arena,
                        std::vector<std::uint32_t>& ids);
 
-// Eight-way nodes by the surface-area heuristic.
-TreeNode* build_sah(const BuildInput& input, std::uint32_t leaf_triangles, TreeArena& arena,
-                    std::vector<std::uint32_t>& ids);
+// By the surface-area heuristic: a binary tree, improved and collapsed. `quality`: more time for
+// fewer tests a ray.
+void build_sah(const BuildInput& input, std::uint32_t leaf_triangles, bool quality, Octree& octree);
+// The most memory that takes beside the scene, the octree included.
+std::uint64_t sah_build_bytes(std::uint64_t triangles, bool quality);
 
 inline Box triangle_box(const BuildInput& input, std::uint32_t triangle) {
   const kernels::Triangle& t = input.triangles[triangle];

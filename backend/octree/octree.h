@@ -12,21 +12,22 @@
 
 namespace octrace::octree {
 
-enum class Builder { median, sah };
+enum class Builder { median, sah, quality };
+const char* name_of(Builder builder);  // as --builder takes it
 
 struct BuildOptions {
   Builder builder = Builder::sah;
-  std::uint32_t leaf = 0;  // median: most vertices in a leaf (0: 8); sah: most triangles (0: 3)
+  std::uint32_t leaf = 0;  // median: most vertices in a leaf (0: 8); else: most triangles (0: 3)
   unsigned threads = 0;    // 0: all
   std::uint64_t max_bytes = 64ull << 30;  // --max-scene-bytes
 };
 
 struct Statistics {
   std::uint64_t nodes = 0;
-  std::uint64_t leaves = 0;  // child slots that hold triangles
-  std::uint64_t triangles = 0;
-  std::uint32_t depth = 0;  // nodes on the longest path from the root
-  std::uint64_t bytes = 0;  // nodes and leaf triangles
+  std::uint64_t leaves = 0;     // child slots that hold triangles
+  std::uint64_t triangles = 0;  // leaf triangles: those in several leaves count as often
+  std::uint32_t depth = 0;      // nodes on the longest path from the root
+  std::uint64_t bytes = 0;      // nodes and leaf triangles
   double children_per_node = 0.0;
   double triangles_per_leaf = 0.0;
   double sah_cost = 0.0;  // expected node and triangle tests of a random ray
@@ -57,7 +58,8 @@ util::Result<Octree> build(const BuildInput& input, const BuildOptions& options)
 util::Result<Octree> build(const scene::Scene& scene, const BuildOptions& options);
 
 // Checks every invariant: child boxes hold their triangles and their children's boxes, every
-// triangle lies in exactly one leaf, indices are in range, depth is within kMaxDepth. Exit 7.
+// triangle lies in a leaf, or all of it in several together; indices are in range, depth is within
+// kMaxDepth. Exit 7.
 util::Result<void> verify(const Octree& octree, const BuildInput& input);
 util::Result<void> verify(const Octree& octree, const scene::Scene& scene);
 

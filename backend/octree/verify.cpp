@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <limits>
+#include <map>
 
 #include "backend/octree/builders.h"
 #include "backend/octree/octree.h"
@@ -24,8 +26,9 @@ class Verifier {
   Verifier(const Octree& octree, const BuildInput& input)
       : octree_(octree),
         input_(input),
-        seen_(input.triangles.size(), false),
-        reached_(octree.nodes.size(), false) {}
+        leaves_(input.triangles.size(), 0),
+        reached_(octree.nodes.size(), false),
+        placed_(octree.triangles.size(), false) {}
 
   util::Result<void> run() {
     if (octree_.nodes.empty()) {
@@ -33,22 +36,55 @@ class Verifier {
         return broken("no nodes over {} triangles", input_.triangles.size());
       return {};
     }
-    if (octree_.triangles.size() != input_.triangles.size()) {
-      return broken("{} leaf triangles, the scene has {}", octree_.triangles.size(),
-                    input_.triangles.size());
+    for (const kernels::LeafTriangle& leaf : octree_.triangles) {
+      if (leaf.triangle < leaves_.size()) ++leaves_[leaf.triangle];
     }
-    Box box;
-    if (util::Result<void> ok = visit(0, 1, box); !ok) return ok;
-    const auto missing = std::find(seen_.begin(), seen_.end(), false);
-    if (missing != seen_.end()) return broken("triangle {} is in no leaf", missing - seen_.begin());
+    const auto missing = std::find(leaves_.begin(), leaves_.end(), 0u);
+    if (missing != leaves_.end()) {
+      return broken("triangle {} is in no leaf", missing - leaves_.begin());
+    }
+    Bounds bounds;
+    const double infinity = std::numeric_limits<double>::infinity();
+    const Space everywhere{{-infinity, -infinity, -infinity}, {infinity, infinity, infinity}};
+    if (util::Result<void> ok = visit(0, 1, everywhere, bounds); !ok) return ok;
+    if (const auto place = std::find(placed_.begin(), placed_.end(), false);
+        place != placed_.end()) {
+      return broken("leaf triangle {} is in no leaf", place - placed_.begin());
+    }
+    for (const auto& [triangle, parts] : parts_) {
+      if (util::Result<void> ok = check_parts(triangle, parts); !ok) return ok;
+    }
     const auto lost = std::find(reached_.begin(), reached_.end(), false);
     if (lost != reached_.end()) return broken("node {} cannot be reached", lost - reached_.begin());
     return {};
   }
 
  private:
-  // Checks the subtree and returns its true box. Recursion is bounded by kMaxDepth.
-  util::Result<void> visit(std::uint64_t index, int depth, Box& bounds) {
+  struct Space {
+    double lower[3], upper[3];
+  };
+  // Of what lies below a slot: the boxes of whole triangles, which must be held; and beside those
+  // the boxes of leaves with parts of triangles, which are as large as they are.
+  struct Bounds {
+    Box whole, all;
+    void add(const Bounds& other) {
+      whole.add(other.whole);
+      all.add(other.all);
+    }
+  };
+
+  Space slot_space(const kernels::Node& node, int slot) const {
+    Space space;
+    for (int axis = 0; axis < 3; ++axis) {
+      const double scale = std::ldexp(1.0, node.exponent[axis]);
+      space.lower[axis] = node.origin[axis] + node.lower[axis][slot] * scale;
+      space.upper[axis] = node.origin[axis] + node.upper[axis][slot] * scale;
+    }
+    return space;
+  }
+
+  // Checks the subtree, which rays enter only within `space`. Recursion is bounded by kMaxDepth.
+  util::Result<void> visit(std::uint64_t index, int depth, const Space& space, Bounds& bounds) {
     if (depth > kernels::kMaxDepth)
       return broken("node {} lies deeper than {}", index, kernels::kMaxDepth);
     if (index >= octree_.nodes.size()) return broken("node {} does not exist", index);
@@ -59,11 +95,17 @@ class Verifier {
     unsigned offset = 0;
     int used = 0;
     for (int slot = 0; slot < kernels::kChildren; ++slot) {
-      Box box;
+      Bounds below;
+      const Space own = slot_space(node, slot);
+      Space common = space;
+      for (int axis = 0; axis < 3; ++axis) {
+        common.lower[axis] = std::max(common.lower[axis], own.lower[axis]);
+        common.upper[axis] = std::min(common.upper[axis], own.upper[axis]);
+      }
       if ((node.inner_mask >> slot) & 1) {
         if (node.meta[slot] != (0x20 | (24 + slot)))
           return broken("node {} slot {}: meta", index, slot);
-        if (util::Result<void> ok = visit(child++, depth + 1, box); !ok) return ok;
+        if (util::Result<void> ok = visit(child++, depth + 1, common, below); !ok) return ok;
       } else if (node.meta[slot] != 0) {
         const unsigned count = std::bit_width(static_cast<unsigned>(node.meta[slot] >> 5));
         const bool unary = (node.meta[slot] >> 5) == (1u << count) - 1u;
@@ -71,8 +113,8 @@ class Verifier {
           return broken("node {} slot {}: leaf counts", index, slot);
         }
         for (unsigned i = 0; i < count; ++i) {
-          if (util::Result<void> ok =
-                  visit_triangle(node.first_triangle + std::uint64_t{offset} + i, box);
+          if (util::Result<void> ok = visit_triangle(
+                  node.first_triangle + std::uint64_t{offset} + i, own, common, below);
               !ok)
             return ok;
         }
@@ -81,45 +123,94 @@ class Verifier {
         continue;
       }
       ++used;
-      if (util::Result<void> ok = check_box(index, slot, box); !ok) return ok;
-      bounds.add(box);
+      if (util::Result<void> ok = check_box(index, slot, own, below); !ok) return ok;
+      bounds.add(below);
     }
     if (used == 0) return broken("node {} has no children", index);
     return {};
   }
 
-  util::Result<void> visit_triangle(std::uint64_t place, Box& box) {
+  util::Result<void> visit_triangle(std::uint64_t place, const Space& own, const Space& common,
+                                    Bounds& bounds) {
     if (place >= octree_.triangles.size()) return broken("leaf triangle {} does not exist", place);
+    if (placed_[place]) return broken("leaf triangle {} is in two leaves", place);
+    placed_[place] = true;
     const kernels::LeafTriangle& leaf = octree_.triangles[place];
     if (leaf.triangle >= input_.triangles.size())
       return broken("leaf triangle {} names triangle {}", place, leaf.triangle);
-    if (seen_[leaf.triangle]) return broken("triangle {} is in two leaves", leaf.triangle);
-    seen_[leaf.triangle] = true;
     const kernels::Triangle& t = input_.triangles[leaf.triangle];
     if (leaf.a != input_.positions[t.a] || leaf.b != input_.positions[t.b] ||
         leaf.c != input_.positions[t.c]) {
       return broken("leaf triangle {} has other corners than triangle {}", place, leaf.triangle);
     }
-    box.add(triangle_box(input_, leaf.triangle));
+    if (leaves_[leaf.triangle] == 1) {
+      bounds.whole.add(triangle_box(input_, leaf.triangle));
+      bounds.all.add(bounds.whole);
+      return {};
+    }
+    if ((leaf.flags & kernels::kBlend) != 0) {
+      return broken("BLEND triangle {} is in {} leaves, and would dim rays as often", leaf.triangle,
+                    leaves_[leaf.triangle]);
+    }
+    parts_[leaf.triangle].push_back(common);
+    bounds.all.add(own_box(own));
+    return {};
+  }
+  static Box own_box(const Space& space) {
+    Box box;
+    for (int axis = 0; axis < 3; ++axis) {
+      box.lower[axis] = static_cast<float>(space.lower[axis]);
+      box.upper[axis] = static_cast<float>(space.upper[axis]);
+    }
+    return box;
+  }
+
+  // A triangle in several leaves: every point of a fine lattice on it lies in one of them.
+  util::Result<void> check_parts(std::uint32_t triangle, const std::vector<Space>& parts) const {
+    constexpr int kLattice = 12;
+    const kernels::Triangle& t = input_.triangles[triangle];
+    for (int i = 0; i <= kLattice; ++i) {
+      for (int j = 0; i + j <= kLattice; ++j) {
+        double point[3];
+        for (int axis = 0; axis < 3; ++axis) {
+          point[axis] =
+              (double{input_.positions[t.a][axis]} * (kLattice - i - j) +
+               double{input_.positions[t.b][axis]} * i + double{input_.positions[t.c][axis]} * j) /
+              kLattice;
+        }
+        const bool held = std::any_of(parts.begin(), parts.end(), [&](const Space& part) {
+          bool inside = true;
+          for (int axis = 0; axis < 3; ++axis) {
+            inside &= part.lower[axis] <= point[axis] && point[axis] <= part.upper[axis];
+          }
+          return inside;
+        });
+        if (!held) {
+          return broken("triangle {} is in {} leaves, none of which holds its point {} {} {}",
+                        triangle, parts.size(), point[0], point[1], point[2]);
+        }
+      }
+    }
     return {};
   }
 
   // The quantised box holds the true one, and is no looser than one step an end.
-  util::Result<void> check_box(std::uint64_t index, int slot, const Box& box) const {
+  util::Result<void> check_box(std::uint64_t index, int slot, const Space& own,
+                               const Bounds& below) const {
     const kernels::Node& node = octree_.nodes[index];
     for (int axis = 0; axis < 3; ++axis) {
       const double scale = std::ldexp(1.0, node.exponent[axis]);
-      const double lower = node.origin[axis] + node.lower[axis][slot] * scale;
-      const double upper = node.origin[axis] + node.upper[axis][slot] * scale;
-      if (!(lower <= box.lower[axis] && upper >= box.upper[axis])) {
+      const double lower = own.lower[axis], upper = own.upper[axis];
+      if (!below.whole.empty() &&
+          !(lower <= below.whole.lower[axis] && upper >= below.whole.upper[axis])) {
         return broken("node {} slot {}: its box [{}, {}] does not hold [{}, {}] along axis {}",
-                      index, slot, lower, upper, float{box.lower[axis]}, float{box.upper[axis]},
-                      axis);
+                      index, slot, lower, upper, float{below.whole.lower[axis]},
+                      float{below.whole.upper[axis]}, axis);
       }
-      if (lower + scale < box.lower[axis] || upper - scale > box.upper[axis]) {
+      if (lower + scale < below.all.lower[axis] || upper - scale > below.all.upper[axis]) {
         return broken("node {} slot {}: its box [{}, {}] is loose around [{}, {}] along axis {}",
-                      index, slot, lower, upper, float{box.lower[axis]}, float{box.upper[axis]},
-                      axis);
+                      index, slot, lower, upper, float{below.all.lower[axis]},
+                      float{below.all.upper[axis]}, axis);
       }
     }
     return {};
@@ -127,8 +218,10 @@ class Verifier {
 
   const Octree& octree_;
   const BuildInput& input_;
-  std::vector<bool> seen_;     // by triangle
-  std::vector<bool> reached_;  // by node
+  std::vector<std::uint32_t> leaves_;                  // by triangle, in how many it is
+  std::vector<bool> reached_;                          // by node
+  std::vector<bool> placed_;                           // by leaf triangle
+  std::map<std::uint32_t, std::vector<Space>> parts_;  // where triangles in several leaves are met
 };
 
 }  // namespace

@@ -219,7 +219,9 @@ util::Result<octree::Octree> build(const Options& options, const scene::Scene& s
     return std::move(built->octree);
   }
   octree::BuildOptions build;
-  build.builder = options.builder == "median" ? octree::Builder::median : octree::Builder::sah;
+  build.builder = options.builder == "median"    ? octree::Builder::median
+                  : options.builder == "quality" ? octree::Builder::quality
+                                                 : octree::Builder::sah;
   return octree::build(scene, build);
 }
 
@@ -277,7 +279,7 @@ void add_rays_command(CLI::App& app, int& exit_code) {
       ->check(CLI::Range(1u, 4096u))
       ->capture_default_str();
   command->add_option("--builder", options->builder, "Octree builder")
-      ->check(CLI::IsMember({"hploc", "median", "sah"}))
+      ->check(CLI::IsMember({"hploc", "median", "sah", "quality"}))
       ->capture_default_str();
   command->add_option("--repeats", options->repeats, "Timed runs a row")
       ->check(CLI::Range(1, 1000))

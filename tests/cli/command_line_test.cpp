@@ -113,7 +113,7 @@ INSTANTIATE_TEST_SUITE_P(
 
 INSTANTIATE_TEST_SUITE_P(Words, WrongCommandLine,
                          ::testing::Values(render({"--device", "gpu"}, "auto, cpu, cuda"),
-                                           render({"--builder", "bvh"}, "median|sah"),
+                                           render({"--builder", "bvh"}, "median|sah|quality"),
                                            render({"--cull", "1"}, "spec|none"),
                                            render({"--alpha", "x"}, "spec|ignore"),
                                            render({"--background", "red"}, "sky|transparent"),

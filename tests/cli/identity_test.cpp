@@ -31,6 +31,7 @@ TEST(Identity, ThreadsTilesAndBuildersChangeNoBit) {
   EXPECT_TRUE(reference == render({"--tile", "1000", "--threads", "2"}));
   EXPECT_TRUE(reference == render({"--builder", "median"}));
   EXPECT_TRUE(reference == render({"--builder", "sah"}));
+  EXPECT_TRUE(reference == render({"--builder", "quality", "--verify"}));
   EXPECT_TRUE(reference == render({"--builder", "median", "--leaf", "32"}));
   EXPECT_TRUE(reference == render({"--builder", "sah", "--leaf", "1"}));
   EXPECT_TRUE(reference == render({"--verify"}));

@@ -1,0 +1,64 @@
+// Splits of references by their centres, by binned surface-area heuristic (Wald 2007, "On fast
+// construction of SAH-based bounding volume hierarchies"): SIMD loops chosen at run time.
+#pragma once
+
+#include <cstdint>
+
+#include "backend/octree/binary_tree.h"
+
+namespace octrace::octree {
+
+inline constexpr int kMaxBins = 32;
+
+// Where a centre falls along each axis: (centre2 - lower) * scale.
+struct Binning {
+  float lower[4];
+  float scale[4];  // 0 along axes whose centres cannot be told apart
+  int bins;
+
+  Binning(const Bounds8& bounds, int bin_count);
+  int bin(const Reference& reference, int axis) const;
+};
+
+struct alignas(32) ObjectBins {
+  float boxes[3][kMaxBins][8];
+  std::uint32_t counts[3][kMaxBins];
+
+  void clear(int bins);
+  void add(const ObjectBins& other, int bins);
+};
+
+struct ObjectSplit {
+  float cost = std::numeric_limits<float>::infinity();  // areas times references
+  int axis = -1;                                        // -1: none
+  int bin = 0;                                          // the first bin of the upper side
+  float overlap = 0.0f;  // half the surface of what the two sides' boxes share
+};
+
+// Nodes of a subtree that one thread builds.
+struct SubtreeRange {
+  Reference* references;
+  std::uint32_t count;
+  BinaryNode* nodes;         // of the whole tree
+  std::uint32_t first_pair;  // the subtree owns count - 1 pairs from here
+  std::uint32_t root;        // where its root goes
+  int bins;                  // of large ranges
+  int sah_depth;             // levels below which ranges are halved by rank
+};
+
+struct ObjectSplitter {
+  Bounds8 (*bounds)(const Reference*, std::uint32_t count);
+  void (*fill)(const Reference*, std::uint32_t count, const Binning&, ObjectBins&);
+  ObjectSplit (*best)(const ObjectBins&, int bins);
+  void (*subtree)(const SubtreeRange&);  // reorders the references
+
+  ObjectSplitter();  // for the instruction set of this machine
+};
+
+// Halves by rank along the longest axis of the centres; the triangle decides among equals. Returns
+// how many come first.
+std::uint32_t split_by_rank(Reference* references, std::uint32_t count, const Bounds8& bounds);
+
+void write_node(BinaryNode& node, const Bounds8& bounds, std::uint32_t child, std::uint32_t count);
+
+}  // namespace octrace::octree

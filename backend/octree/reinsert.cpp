@@ -1,0 +1,210 @@
+#include "backend/octree/reinsert.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+#include <tbb/parallel_invoke.h>
+
+#include <algorithm>
+#include <vector>
+
+namespace octrace::octree {
+
+namespace {
+
+using Index = std::uint32_t;
+constexpr Index kRoot = BinaryTree::kRoot;
+constexpr std::uint32_t kParallel = 4096;  // references worth a task
+
+float joined_half_area(const BinaryNode& a, const BinaryNode& b) {
+  float extent[3];
+  for (int i = 0; i < 3; ++i) {
+    extent[i] = std::max(a.upper[i], b.upper[i]) - std::min(a.lower[i], b.lower[i]);
+  }
+  return extent[0] * extent[1] + extent[1] * extent[2] + extent[2] * extent[0];
+}
+
+struct Move {
+  Index from = 0, to = 0;
+  float gain = 0.0f;
+};
+
+class Reinserter {
+ public:
+  explicit Reinserter(BinaryTree& tree)
+      : nodes_(tree.nodes.get()),
+        parents_(std::make_unique_for_overwrite<Index[]>(tree.size)),
+        references_(nodes_[kRoot].plan),
+        touched_(tree.size, false) {
+    parents_[kRoot] = 0;
+    link(kRoot);
+  }
+
+  void round(float share) {
+    const std::vector<Index> candidates = largest(std::max<std::size_t>(
+        1, static_cast<std::size_t>(share * 2.0f * static_cast<float>(references_))));
+    std::vector<Move> moves(candidates.size());
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, candidates.size(), 16),
+                      [&](const auto& range) {
+                        std::vector<Step> stack;
+                        for (std::size_t i = range.begin(); i < range.end(); ++i) {
+                          moves[i] = find(candidates[i], stack);
+                        }
+                      });
+    std::erase_if(moves, [](const Move& move) { return move.gain <= 0.0f; });
+    std::sort(moves.begin(), moves.end(), [](const Move& a, const Move& b) {
+      return a.gain > b.gain || (a.gain == b.gain && a.from < b.from);
+    });
+    for (const Move& move : moves) {
+      const Index parent = parents_[move.from];
+      const Index all[] = {move.from,        move.from ^ 1u, parent,
+                           parents_[parent], move.to,        parents_[move.to]};
+      const auto is_touched = [&](Index i) { return i > kRoot && touched_[i]; };
+      if (std::any_of(std::begin(all), std::end(all), is_touched) || holds(move.from, move.to)) {
+        continue;
+      }
+      for (const Index i : all) {
+        touched_[i] = true;
+        touched_list_.push_back(i);
+      }
+      apply(move);
+    }
+    for (const Index i : touched_list_) touched_[i] = false;
+    touched_list_.clear();
+  }
+
+ private:
+  void link(Index index) {
+    const BinaryNode& node = nodes_[index];
+    if (node.leaf()) return;
+    const Index first = 2 * node.child;
+    parents_[first] = parents_[first + 1] = index;
+    if (node.plan > kParallel) {
+      tbb::parallel_invoke([&] { link(first); }, [&] { link(first + 1); });
+    } else {
+      link(first);
+      link(first + 1);
+    }
+  }
+
+  // The nodes of the largest surfaces: as none is larger than its parent, they are found from the
+  // root down. Children of the root cannot move.
+  std::vector<Index> largest(std::size_t count) const {
+    using Entry = std::pair<float, Index>;
+    std::vector<Entry> heap = {{nodes_[kRoot].half_area(), kRoot}};
+    std::vector<Index> found;
+    found.reserve(count);
+    while (!heap.empty() && found.size() < count) {
+      std::pop_heap(heap.begin(), heap.end());
+      const Index index = heap.back().second;
+      heap.pop_back();
+      if (parents_[index] > kRoot) found.push_back(index);
+      const BinaryNode& node = nodes_[index];
+      if (node.leaf()) continue;
+      for (const Index child : {2 * node.child, 2 * node.child + 1}) {
+        heap.emplace_back(nodes_[child].half_area(), child);
+        std::push_heap(heap.begin(), heap.end());
+      }
+    }
+    return found;
+  }
+
+  struct Step {
+    float gain;
+    Index index;
+  };
+
+  // Branch and bound from the node's sibling up to the root and down each way.
+  Move find(Index from, std::vector<Step>& stack) const {
+    const BinaryNode& node = nodes_[from];
+    const float area = node.half_area();
+    const Index parent = parents_[from];
+    Move best{from, 0, 0.0f};
+    float gain_here = nodes_[parent].half_area();
+    Index sibling = from ^ 1u, pivot = parent;
+    BinaryNode without = nodes_[sibling];  // the pivot's box without the node
+    for (;;) {
+      stack.push_back({gain_here, sibling});
+      while (!stack.empty()) {
+        const Step step = stack.back();
+        stack.pop_back();
+        if (step.gain - area <= best.gain) continue;
+        const BinaryNode& to = nodes_[step.index];
+        const float gain = step.gain - joined_half_area(to, node);
+        if (gain > best.gain) {
+          best.to = step.index;
+          best.gain = gain;
+        }
+        if (to.leaf()) continue;
+        const float below = gain + to.half_area();
+        if (below - area <= best.gain) continue;
+        stack.push_back({below, 2 * to.child});
+        stack.push_back({below, 2 * to.child + 1});
+      }
+      if (pivot != parent) {
+        const BinaryNode& other = nodes_[sibling];
+        for (int a = 0; a < 3; ++a) {
+          without.lower[a] = std::min(without.lower[a], other.lower[a]);
+          without.upper[a] = std::max(without.upper[a], other.upper[a]);
+        }
+        gain_here += nodes_[pivot].half_area() - without.half_area();
+      }
+      if (pivot == kRoot) break;
+      sibling = pivot ^ 1u;
+      pivot = parents_[pivot];
+    }
+    if (best.to == (from ^ 1u) || best.to == parent) return {};
+    return best;
+  }
+
+  // The sibling takes the parent's place, and the pair that is free now joins `from` with `to`.
+  void apply(const Move& move) {
+    const Index sibling = move.from ^ 1u, parent = parents_[move.from];
+    const BinaryNode moved_up = nodes_[sibling], target = nodes_[move.to];
+    nodes_[parent] = moved_up;
+    adopt(parent);
+    nodes_[sibling] = target;
+    adopt(sibling);
+    nodes_[move.to].child = sibling >> 1;
+    parents_[sibling] = parents_[move.from] = move.to;
+    refit(move.to);
+    refit(parents_[parent]);
+  }
+  void adopt(Index index) {
+    const BinaryNode& node = nodes_[index];
+    if (!node.leaf()) parents_[2 * node.child] = parents_[2 * node.child + 1] = index;
+  }
+  void refit(Index index) {
+    for (; index != 0; index = parents_[index]) {
+      BinaryNode& node = nodes_[index];
+      const BinaryNode &a = nodes_[2 * node.child], &b = nodes_[2 * node.child + 1];
+      for (int axis = 0; axis < 3; ++axis) {
+        node.lower[axis] = std::min(a.lower[axis], b.lower[axis]);
+        node.upper[axis] = std::max(a.upper[axis], b.upper[axis]);
+      }
+    }
+  }
+
+  // Another move of this round may have brought the target below the node itself.
+  bool holds(Index node, Index target) const {
+    for (; target != 0; target = parents_[target]) {
+      if (target == node) return true;
+    }
+    return false;
+  }
+
+  BinaryNode* nodes_;
+  std::unique_ptr<Index[]> parents_;
+  std::uint32_t references_;
+  std::vector<bool> touched_;  // by moves of this round
+  std::vector<Index> touched_list_;
+};
+
+}  // namespace
+
+void reinsert(BinaryTree& tree, const ReinsertOptions& options) {
+  if (options.rounds == 0 || tree.nodes[kRoot].leaf()) return;
+  Reinserter reinserter(tree);
+  for (int i = 0; i < options.rounds; ++i) reinserter.round(options.share);
+}
+
+}  // namespace octrace::octree

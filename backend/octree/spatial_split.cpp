@@ -1,0 +1,174 @@
+#include "backend/octree/spatial_split.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace octrace::octree {
+
+namespace {
+
+using kernels::Vec3;
+
+// A triangle that is cut, with what all its cuts share.
+struct Cutter {
+  Vec3 corners[3];
+  float padding;
+  float margin;
+
+  Cutter(const BuildInput& input, const Reference& reference) {
+    const kernels::Triangle& t = input.triangles[reference.triangle];
+    corners[0] = input.positions[t.a];
+    corners[1] = input.positions[t.b];
+    corners[2] = input.positions[t.c];
+    float side = 0.0f, largest = 0.0f;
+    for (int a = 0; a < 3; ++a) {
+      const float lower = std::min({corners[0][a], corners[1][a], corners[2][a]});
+      const float upper = std::max({corners[0][a], corners[1][a], corners[2][a]});
+      side = std::max(side, upper - lower);
+      largest = std::max({largest, -lower, upper});
+    }
+    padding = side * 0x1p-10f + largest * 0x1p-21f;
+    margin = side * 0x1p-18f;
+  }
+
+  bool cut(const Reference& reference, int axis, float plane, Reference* lower,
+           Reference* upper) const {
+    if (!(plane - reference.lower[axis] > 2.0f * padding) ||
+        !(reference.upper(axis) - plane > 2.0f * padding)) {
+      return false;
+    }
+    Box below, above;
+    for (int i = 0; i < 3; ++i) {
+      const Vec3 &a = corners[i], &b = corners[i == 2 ? 0 : i + 1];
+      if (a[axis] <= plane) below.add(float4(a));
+      if (a[axis] >= plane) above.add(float4(a));
+      if ((a[axis] < plane && b[axis] > plane) || (a[axis] > plane && b[axis] < plane)) {
+        Vec3 crossing = a + (b - a) * ((plane - a[axis]) / (b[axis] - a[axis]));
+        crossing[axis] = plane;
+        below.add(float4(crossing));
+        above.add(float4(crossing));
+      }
+    }
+    const float beyond = reference.part != 0 ? 0.0f : margin;
+    Reference low = reference, high = reference;
+    low.part = high.part = 1;
+    return bound(below, beyond, &low) && bound(above, beyond, &high) &&
+           (*lower = low, *upper = high, true);
+  }
+
+ private:
+  bool bound(const Box& box, float beyond, Reference* part) const {
+    bool empty = false;
+    for (int a = 0; a < 3; ++a) {
+      part->lower[a] = std::max(part->lower[a] - beyond, box.lower[a] - padding);
+      part->negated_upper[a] = std::max(part->negated_upper[a] - beyond, -(box.upper[a] + padding));
+      empty |= !(part->lower[a] <= part->upper(a));
+    }
+    return !empty;
+  }
+};
+
+void join_box(Bounds8& bounds, const Reference& reference) {
+  for (int i = 0; i < 8; ++i) {
+    bounds.box[i] = std::min(bounds.box[i], (&reference.lower[0])[i]);
+  }
+}
+
+// A ray is dimmed once by a BLEND triangle, so that must be in one leaf.
+bool may_cut(const BuildInput& input, const Reference& reference) {
+  return input.flags.empty() || input.triangle_geometry.empty() ||
+         (input.flags[input.triangle_geometry[reference.triangle]] & kernels::kBlend) == 0;
+}
+
+}  // namespace
+
+bool cut(const BuildInput& input, const Reference& reference, int axis, float plane,
+         Reference* lower, Reference* upper) {
+  return may_cut(input, reference) &&
+         Cutter(input, reference).cut(reference, axis, plane, lower, upper);
+}
+
+SpatialBinning::SpatialBinning(const Bounds8& bounds, int bin_count) : bins(bin_count) {
+  for (int axis = 0; axis < 3; ++axis) {
+    lower[axis] = bounds.lower(axis);
+    extent[axis] = bounds.upper(axis) - lower[axis];
+    scale[axis] = static_cast<float>(bins) / extent[axis];
+    // A denormal extent overflows the quotient; no plane divides such an axis.
+    if (!(scale[axis] < std::numeric_limits<float>::max())) extent[axis] = scale[axis] = 0.0f;
+  }
+}
+
+float SpatialBinning::plane(int axis, int bin) const {
+  return lower[axis] + extent[axis] * (static_cast<float>(bin) / static_cast<float>(bins));
+}
+
+int SpatialBinning::bin(float position, int axis) const {
+  return std::clamp(static_cast<int>((position - lower[axis]) * scale[axis]), 0, bins - 1);
+}
+
+void SpatialBins::add(const SpatialBins& other, int bins) {
+  for (int axis = 0; axis < 3; ++axis) {
+    for (int bin = 0; bin < bins; ++bin) {
+      for (int i = 0; i < 8; ++i) {
+        parts[axis][bin].box[i] = std::min(parts[axis][bin].box[i], other.parts[axis][bin].box[i]);
+      }
+      enter[axis][bin] += other.enter[axis][bin];
+      leave[axis][bin] += other.leave[axis][bin];
+    }
+  }
+}
+
+void fill(const BuildInput& input, const Reference* references, std::uint32_t count,
+          const SpatialBinning& binning, SpatialBins& bins) {
+  for (int axis = 0; axis < 3; ++axis) {
+    if (!(binning.extent[axis] > 0.0f)) continue;
+    for (std::uint32_t i = 0; i < count; ++i) {
+      Reference rest = references[i];
+      const int first = binning.bin(rest.lower[axis], axis);
+      const int last = binning.bin(rest.upper(axis), axis);
+      int at = first;
+      if (first != last && may_cut(input, rest)) {
+        const Cutter cutter(input, rest);
+        for (int next = first; next < last; ++next) {
+          Reference part;
+          if (!cutter.cut(rest, axis, binning.plane(axis, next + 1), &part, &rest)) continue;
+          join_box(bins.parts[axis][next], part);
+          at = next + 1;
+        }
+      }
+      join_box(bins.parts[axis][at], rest);
+      ++bins.enter[axis][first];
+      ++bins.leave[axis][at];
+    }
+  }
+}
+
+SpatialSplit best(const SpatialBins& bins, const SpatialBinning& binning) {
+  SpatialSplit split;
+  for (int axis = 0; axis < 3; ++axis) {
+    if (!(binning.extent[axis] > 0.0f)) continue;
+    float upper_cost[kMaxBins];
+    Bounds8 box;
+    std::uint32_t references = 0;
+    const auto join = [&box](const Bounds8& part) {
+      for (int i = 0; i < 8; ++i) box.box[i] = std::min(box.box[i], part.box[i]);
+    };
+    for (int bin = binning.bins - 1; bin > 0; --bin) {
+      join(bins.parts[axis][bin]);
+      references += bins.leave[axis][bin];
+      upper_cost[bin] = references == 0 ? -1.0f : box.half_area() * static_cast<float>(references);
+    }
+    box = Bounds8();
+    references = 0;
+    for (int bin = 1; bin < binning.bins; ++bin) {
+      join(bins.parts[axis][bin - 1]);
+      references += bins.enter[axis][bin - 1];
+      if (references == 0 || upper_cost[bin] < 0.0f) continue;
+      const float cost = box.half_area() * static_cast<float>(references) + upper_cost[bin];
+      if (cost < split.cost) split = {cost, axis, binning.plane(axis, bin)};
+    }
+  }
+  return split;
+}
+
+}  // namespace octrace::octree

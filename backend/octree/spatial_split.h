@@ -1,0 +1,53 @@
+// Splits of space, which cut triangles into parts (Stich, Friedrich, Dietrich 2009, "Spatial splits
+// in bounding volume hierarchies").
+//
+// The box of a part is larger than the part, so that the computed hit, which may stray from its
+// place (kernels/triangle.h), lies in the box of one of the parts: by 2^-10 of the triangle's
+// longest side, twice the weights' error; and by 2^-21 of the largest coordinate, four times the
+// rounding of the corners that clipping makes. It never passes the triangle's own box by more than
+// 2^-18 of the longest side, which with the padding of box tests covers the rounding of t.
+#pragma once
+
+#include <limits>
+
+#include "backend/octree/binary_tree.h"
+#include "backend/octree/object_split.h"
+
+namespace octrace::octree {
+
+// Planes at equal distances between the bounds of a range.
+struct SpatialBinning {
+  float lower[3];
+  float extent[3];  // 0: not to be divided
+  float scale[3];
+  int bins;
+
+  SpatialBinning(const Bounds8& bounds, int bin_count);
+  float plane(int axis, int bin) const;  // the lower end of the bin
+  int bin(float position, int axis) const;
+};
+
+struct SpatialBins {
+  Bounds8 parts[3][kMaxBins];
+  std::uint32_t enter[3][kMaxBins] = {};  // references that begin here
+  std::uint32_t leave[3][kMaxBins] = {};  // and end here
+
+  void add(const SpatialBins& other, int bins);
+};
+
+struct SpatialSplit {
+  float cost = std::numeric_limits<float>::infinity();
+  int axis = -1;
+  float plane = 0.0f;
+};
+
+// Cuts the reference in two. False, and both untouched: it may not be cut, or one part would be no
+// smaller than the reference.
+bool cut(const BuildInput& input, const Reference& reference, int axis, float plane,
+         Reference* lower, Reference* upper);
+
+void fill(const BuildInput& input, const Reference* references, std::uint32_t count,
+          const SpatialBinning& binning, SpatialBins& bins);
+SpatialSplit best(const SpatialBins& bins, const SpatialBinning& binning);
+
+}  // namespace octrace::octree
