@@ -259,6 +259,13 @@ Result<Job> parse_job(const Json& root, const std::string& path, const util::Lim
   if (auto ok = parse_size_member(json.at("size"), job, limits); !ok) return ok.error();
   auto words = parse_aov_words(json.at("aovs"), job.aovs);
   if (!words) return words.error();
+  // At rest motion is 0; between frames it needs the next one, which a batch does not look at.
+  if (!job.frames.empty() && job.aovs.test(static_cast<std::size_t>(kernels::Aov::motion))) {
+    util::Error error = json.at("aovs").error(
+        "motion of frames is not rendered by a batch: use octrace render --frame N --aov motion");
+    error.exit = util::Exit::unsupported;
+    return error;
+  }
   auto outputs = parse_outputs(json.at("output"), *words, job);
   if (!outputs) return outputs.error();
   job.outputs = std::move(*outputs);
