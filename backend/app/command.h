@@ -20,5 +20,6 @@ void declare_compare(CLI::App& program, Run& chosen);
 void declare_validate(CLI::App& program, Run& chosen);
 void declare_export(CLI::App& program, Run& chosen);
 void declare_batch(CLI::App& program, Run& chosen);
+void declare_submit(CLI::App& program, Run& chosen);
 
 }  // namespace octrace::app

@@ -10,6 +10,7 @@
 #include "backend/app/preload.h"
 #include "backend/batch/finish.h"
 #include "backend/batch/plan.h"
+#include "backend/batch/results.h"
 #include "backend/batch/runner.h"
 #include "backend/batch/state.h"
 #include "backend/batch/summary.h"
@@ -26,7 +27,7 @@ struct BatchRequest {
   std::string job, out, shard;
   std::optional<std::string> device;
   std::optional<std::uint32_t> spp;
-  bool dry_run = false;
+  bool dry_run = false, merge = false;
   BatchProgressMode progress = BatchProgressMode::automatic;
   batch::RunOptions run;
 };
@@ -116,6 +117,19 @@ void tell(const batch::Plan& plan, const batch::RunSummary& summary) {
   if (standing.left() > 0) util::log_info("the same command goes on");
 }
 
+Result<util::Exit> merge(const batch::Plan& plan, const BatchRequest& request) {
+  const util::InterruptGuard interruptible;
+  auto results = batch::merge_job(plan, request.run.limits);
+  if (!results) return results.error();
+  for (const auto& [first, last] : results->missing) {
+    util::log_error(first == last ? fmt::format("view {} is missing", first)
+                                  : fmt::format("views {} to {} are missing", first, last));
+  }
+  util::log_info(fmt::format("{} of {} views done, by {} journals; {}summary.json", results->done,
+                             results->views, results->journals, plan.folder()));
+  return results->done == results->views ? util::Exit::ok : util::Exit::partial;
+}
+
 Result<util::Exit> run_batch(BatchRequest request) {
   auto shard = parse_shard(request.shard);
   if (!shard) return shard.error();
@@ -123,6 +137,7 @@ Result<util::Exit> run_batch(BatchRequest request) {
   auto plan = make_plan(request);
   if (!plan) return plan.error();
   if (request.dry_run) return dry_run(*plan, request);
+  if (request.merge) return merge(*plan, request);
   preload_libraries(batch::needs_image_library(plan->files(plan->view(0))));
   BatchProgress progress(request.progress);
   request.run.progress = [&](const batch::Standing& standing) { progress.update(standing); };
@@ -146,6 +161,9 @@ void declare_running(CLI::App& command, BatchRequest& request) {
       ->type_name("DIR");
   command.add_flag("--dry-run", request.dry_run,
                    "list the files that would be made, and make none");
+  command.add_flag(
+      "--merge", request.merge,
+      "render nothing: write cameras.json and the like from the journals of all shards");
   command.add_flag("--force", request.run.force, "forget what was done, and start anew");
   command.add_option("--shard", request.shard, "only part I of N, from 1 [all]")->type_name("I/N");
   command

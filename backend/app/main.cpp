@@ -63,6 +63,7 @@ int run(int argc, char** argv) {
   declare_validate(program, chosen);
   declare_export(program, chosen);
   declare_batch(program, chosen);
+  declare_submit(program, chosen);
   try {
     program.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

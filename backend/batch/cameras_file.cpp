@@ -55,9 +55,11 @@ util::Result<ordered_json> camera_entry(const ordered_json& view_line) {
     const int width = view_line.at("size").at(0), height = view_line.at("size").at(1);
     const scene::Projection projection = scene::make_projection(*camera, width, height);
     ordered_json entry;
-    for (const char* key : {"view", "name", "camera", "frame", "time"}) {
-      entry[key == std::string_view("name") ? "scene" : key] = view_line.at(key);
-    }
+    entry["view"] = view_line.at("view");
+    entry["scene"] = view_line.at("name");
+    entry["camera"] = view_line.at("camera");
+    entry["frame"] = view_line.at("frame");
+    if (view_line.contains("time")) entry["time"] = view_line["time"];
     entry["files"] = ordered_json::array();
     for (const ordered_json& file : view_line.at("files")) {
       entry["files"].push_back(file.at("path"));

@@ -1,5 +1,6 @@
 #include "backend/batch/finish.h"
 
+#include "backend/batch/results.h"
 #include "backend/batch/state.h"
 #include "backend/batch/summary.h"
 #include "backend/util/atomic_file.h"
@@ -13,6 +14,9 @@ util::Result<void> write_results(const Plan& plan, const RunOptions& options,
           .dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) +
       "\n";
   const bool divided = options.shard.count > 1;
+  if (!divided && !summary.interrupted && !summary.fatal) {
+    if (auto written = write_job_results(plan); !written) return written.error();
+  }
   return util::write_file(
       divided ? shard_summary_path(plan.folder(), options.shard) : plan.folder() + "summary.json",
       text);

@@ -212,9 +212,11 @@ Result<void> parse_annotations(const JsonAt& json, Job& job) {
     return ok;
   if (job.objects && !ids) return json.at("objects").error("needs \"object_id\" among \"aovs\"");
   if (!json.has("masks")) return {};
-  if (auto chosen = word(json.at("masks"), {"coco"}); !chosen) return chosen.error();
+  auto chosen = word(json.at("masks"), {"coco", "coco_counts"});
+  if (!chosen) return chosen.error();
   if (!job.objects) return json.at("masks").error("needs \"objects\", which needs \"object_id\"");
   job.coco_masks = true;
+  job.coco_counts = *chosen == 1;
   return {};
 }
 

@@ -62,7 +62,8 @@ struct Job {
   std::string device = "auto", compression = "zip";
   kernels::RenderParams params;
   double depth_scale = 1000.0;
-  bool missing_images_warn = false, objects = false, coco_masks = false;
+  bool missing_images_warn = false, objects = false;
+  bool coco_masks = false, coco_counts = false;  // counts: as lists, not as strings
 };
 
 // Usage errors with the place in the file; exit 5 or 6 for the file itself; exit 3 for a camera or

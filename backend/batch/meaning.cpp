@@ -97,7 +97,7 @@ ordered_json Plan::meaning(const util::Limits& limits) const {
   json["missing_images"] = job_.missing_images_warn ? "warn" : "error";
   json["compression"] = job_.compression;
   json["objects"] = job_.objects;
-  json["masks"] = job_.coco_masks ? "coco" : "none";
+  json["masks"] = job_.coco_counts ? "coco_counts" : job_.coco_masks ? "coco" : "none";
   return json;
 }
 

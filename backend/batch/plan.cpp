@@ -182,6 +182,7 @@ std::vector<Output> Plan::files(const View& view) const {
 render::AovSet Plan::needed_aovs() const {
   render::AovSet needed;
   for (const JobOutput& output : job_.outputs) needed |= batch::needed_aovs(output.files);
+  if (job_.objects) needed.set(static_cast<std::size_t>(kernels::Aov::object_id));
   return needed;
 }
 

@@ -14,6 +14,7 @@
 #include "backend/batch/hash.h"
 #include "backend/batch/scene_session.h"
 #include "backend/batch/state.h"
+#include "backend/batch/view_record.h"
 #include "backend/batch/view_writer.h"
 #include "backend/image/image.h"
 #include "backend/render/tiles.h"
@@ -164,6 +165,13 @@ void Run::run() {
 
 void Run::run_scene(const Work& work, Opened opened, const Work* next) {
   SceneSession& session = **opened;
+  if (plan_.job().objects && !done_.scenes_described[work.scene]) {
+    writer_.note_scene({{"kind", "scene"},
+                        {"scene", work.scene},
+                        {"source", plan_.job().scenes[work.scene].path},
+                        {"name", plan_.job().scenes[work.scene].name},
+                        {"objects", scene_objects_record(session.scene)}});
+  }
   rest_bounds_ = session.scene.bounds;
   const auto renderer = render::make_renderer(session.scene, session.octree, options_.device);
   frame_.reset();

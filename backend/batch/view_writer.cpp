@@ -8,6 +8,7 @@
 
 #include "backend/batch/camera_choice.h"
 #include "backend/batch/output.h"
+#include "backend/batch/view_record.h"
 #include "backend/util/interrupt.h"
 #include "backend/util/process.h"
 
@@ -150,6 +151,12 @@ void ViewWriter::write(TracedView& view) {
   line["size"] = {view.framebuffer->width(), view.framebuffer->height()};
   line["files"] = std::move(*files);
   line["lens"] = ordered_json::parse(camera_json(view.camera));
+  if (plan_.job().objects) {
+    const render::Framebuffer& image = *view.framebuffer;
+    line["objects"] =
+        objects_record(find_objects(image.uints(kernels::Aov::object_id), image.width(),
+                                    image.height(), plan_.job().coco_masks));
+  }
   line["ms"] = {view.trace_ms, write_ms};
   if (auto noted = note(line); !noted) return stop(noted.error());
   {
