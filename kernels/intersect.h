@@ -65,6 +65,15 @@ struct TransmittanceLeaf {
                             false, &found)) {
       return false;
     }
+    return add_surface(scene, params, triangle, found, opacity);
+  }
+
+  // Adds what a surface that was hit takes of the light; true where nothing is left.
+  OCTRACE_HD OCTRACE_FORCE_INLINE static bool add_surface(const SceneView& scene,
+                                                          const RenderParams& params,
+                                                          const LeafTriangle& triangle,
+                                                          const TriangleHit& found,
+                                                          std::uint32_t& opacity) {
     if (params.alpha != 0 && (triangle.flags & kAlphaTest) != 0 &&
         !alpha_passes(scene, triangle.geometry, triangle.triangle, found.u, found.v)) {
       return false;
@@ -80,7 +89,7 @@ struct TransmittanceLeaf {
     return true;
   }
 
-  OCTRACE_HD float transmittance() const {
+  OCTRACE_HD static float transmittance_of(std::uint32_t opacity) {
     return opacity >= kBlocked ? 0.0f : exp2f(-static_cast<float>(opacity) / kOne);
   }
 };
@@ -120,7 +129,7 @@ OCTRACE_HD OCTRACE_FORCE_INLINE TraceStatus shadow_transmittance(const SceneView
   Walk walk(scene.octree, ray);
   TransmittanceLeaf leaf = transmittance_leaf(scene, params, walk, ray);
   const TraceStatus status = traverse(scene.octree, walk, child_test, leaf);
-  *transmittance = leaf.transmittance();
+  *transmittance = TransmittanceLeaf::transmittance_of(leaf.opacity);
   return status;
 }
 

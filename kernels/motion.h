@@ -25,10 +25,19 @@ OCTRACE_HD inline bool project(const Projection& camera, Vec3 point, Vec2* pixel
   return is_finite(pixel->x) && is_finite(pixel->y);
 }
 
+struct Instance;
+
 struct MotionView {
   Span<Vec3> next_positions;  // as SceneView::positions; empty: no vertex moves
   Projection now, next;
+  Span<Instance> next_instances;  // as InstancedSceneView::instances; empty: no instance moves
 };
+
+OCTRACE_HD inline Vec2 motion_between(const MotionView& motion, Vec3 here, Vec3 there) {
+  Vec2 from, to;
+  if (!project(motion.now, here, &from) || !project(motion.next, there, &to)) return Vec2(0.0f);
+  return to - from;
+}
 
 // In pixels, +x to the right, +y down: where the point will be less where it is. Both ends go
 // through project(), so that what stands still has a motion of exactly 0. 0 where nothing is hit or
@@ -41,19 +50,19 @@ OCTRACE_HD inline Vec2 motion_of(const SceneView& scene, const MotionView& motio
   };
   const Vec3 here = at(scene.positions);
   const Vec3 there = motion.next_positions.empty() ? here : at(motion.next_positions);
-  Vec2 from, to;
-  if (!project(motion.now, here, &from) || !project(motion.next, there, &to)) return Vec2(0.0f);
-  return to - from;
+  return motion_between(motion, here, there);
 }
 
 // What trace_geometry() does with a hit beside its own planes.
 struct NoMotion {
-  OCTRACE_HD void operator()(const SceneView&, const Hit&, const FramebufferView&,
+  template <class Scene>
+  OCTRACE_HD void operator()(const Scene&, const HitOf<Scene>&, const FramebufferView&,
                              std::uint64_t) const {}
 };
 struct MotionPlane {
   const MotionView& motion;
-  OCTRACE_HD void operator()(const SceneView& scene, const Hit& hit, const FramebufferView& to,
+  template <class Scene>
+  OCTRACE_HD void operator()(const Scene& scene, const HitOf<Scene>& hit, const FramebufferView& to,
                              std::uint64_t pixel) const {
     const Vec2 value = hit.valid() ? motion_of(scene, motion, hit) : Vec2(0.0f);
     float* plane = to.floats(Aov::motion);

@@ -52,8 +52,8 @@ OCTRACE_HD inline float blend_alpha(const RenderParams& params, const Material& 
 }
 
 // Adds up the connections of a shading point that nothing blocks.
-template <class Tracer>
-OCTRACE_HD TraceStatus gather(const SceneView& scene, const RenderParams& params,
+template <class Scene, class Tracer>
+OCTRACE_HD TraceStatus gather(const Scene& scene, const RenderParams& params,
                               const ShadingPoint& at, const Sampler& sampler,
                               std::uint32_t dimension, bool specular_sky, const Tracer& tracer,
                               RayCounts* counts, Vec3* radiance) {
@@ -95,17 +95,17 @@ OCTRACE_HD inline Vec3 bounded(Vec3 radiance) {
 }
 
 // RGB: radiance of what `ray` sees, premultiplied; A: coverage.
-template <class Tracer>
-OCTRACE_HD TraceStatus trace_path(const SceneView& scene, const RenderParams& params,
-                                  const Ray& ray, const Sampler& sampler, const Tracer& tracer,
-                                  RayCounts* counts, Vec4* color) {
+template <class Scene, class Tracer>
+OCTRACE_HD TraceStatus trace_path(const Scene& scene, const RenderParams& params, const Ray& ray,
+                                  const Sampler& sampler, const Tracer& tracer, RayCounts* counts,
+                                  Vec4* color) {
   Vec3 radiance(0.0f);
   float background = 0.0f;
   Segment segment{ray, Vec3(1.0f), 1.0f, 0.0f, false, 0};
   Segment later = segment;  // the camera ray behind the surface whose reflection is being followed
   bool is_later = false;
   for (;;) {
-    Hit hit;
+    HitOf<Scene> hit;
     ++counts->beauty;
     TraceStatus status = tracer.closest(scene, params, segment.ray, &hit);
     if (status != TraceStatus::ok) return status;
@@ -116,9 +116,10 @@ OCTRACE_HD TraceStatus trace_path(const SceneView& scene, const RenderParams& pa
       if (segment.reflected || params.transparent_background == 0)
         radiance += bounded(segment.sky_weight * (segment.weight * params.sky));
     } else {
-      const Surface surface = make_surface(scene, segment.ray, hit);
-      const Material& material = material_of(scene, surface);
-      const Vec4 base = base_color(scene, surface);
+      const auto surface = make_surface(scene, segment.ray, hit);
+      const SceneView& arrays = arrays_of(scene, hit);
+      const Material& material = material_of(arrays, surface);
+      const Vec4 base = base_color(arrays, surface);
       const float alpha = blend_alpha(params, material, base, segment.layer);
       next = behind(segment, hit.t, alpha);
       goes_on = largest(next.weight) > kLeastWeight;
@@ -127,7 +128,7 @@ OCTRACE_HD TraceStatus trace_path(const SceneView& scene, const RenderParams& pa
         radiance += bounded(weight * Vec3(base.x, base.y, base.z));
       } else if (alpha > 0.0f) {
         const Vec3 view = normalize_or(-segment.ray.direction, surface.geometric_normal);
-        ShadingPoint at = make_shading_point(scene, surface, view, base);
+        ShadingPoint at = make_shading_point(arrays, surface, view, base);
         at.brdf.alpha = lesser(greater(at.brdf.alpha, segment.blur), 1.0f);
         const std::uint32_t dimension =
             1 + kDimensions * (segment.layer + (segment.reflected ? kMaxLayers : 0));

@@ -41,14 +41,16 @@ OCTRACE_HD inline void store_background(const FramebufferView& to, std::uint64_t
   if (std::uint32_t* plane = to.uints(Aov::primitive_id)) plane[pixel] = 0;
 }
 
-OCTRACE_HD inline void store_hit(const SceneView& scene, const Ray& ray, const Hit& hit,
+template <class Scene>
+OCTRACE_HD inline void store_hit(const Scene& scene, const Ray& ray, const HitOf<Scene>& hit,
                                  const FramebufferView& to, std::uint64_t pixel) {
-  const Geometry& geometry = scene.geometries[scene.triangle_geometry[hit.triangle]];
+  const SceneView& arrays = arrays_of(scene, hit);
+  const Geometry& geometry = arrays.geometries[arrays.triangle_geometry[hit.triangle]];
   if (float* plane = to.floats(Aov::depth)) plane[pixel] = hit.t;
   if (float* plane = to.floats(Aov::distance)) plane[pixel] = hit.t * length(ray.direction);
   if (float* plane = to.floats(Aov::mask)) plane[pixel] = 1.0f;
   if (float* plane = to.floats(Aov::barycentric)) store(plane, pixel, Vec2(hit.u, hit.v));
-  if (std::uint32_t* plane = to.uints(Aov::object_id)) plane[pixel] = geometry.object + 1;
+  if (std::uint32_t* plane = to.uints(Aov::object_id)) plane[pixel] = object_of(scene, hit) + 1;
   if (std::uint32_t* plane = to.uints(Aov::material_id)) plane[pixel] = geometry.material + 1;
   if (std::uint32_t* plane = to.uints(Aov::primitive_id)) plane[pixel] = hit.triangle + 1;
 
@@ -58,30 +60,30 @@ OCTRACE_HD inline void store_hit(const SceneView& scene, const Ray& ray, const H
   float* albedo = to.floats(Aov::albedo);
   float* uv = to.floats(Aov::uv);
   if (!normal && !geometric_normal && !position && !albedo && !uv) return;
-  const Surface surface = make_surface(scene, ray, hit);
+  const auto surface = make_surface(scene, ray, hit);
   if (geometric_normal) store(geometric_normal, pixel, surface.geometric_normal);
-  if (normal) store(normal, pixel, shading_normal(scene, surface));
+  if (normal) store(normal, pixel, shading_normal(arrays, surface));
   if (position) store(position, pixel, surface.position);
   if (albedo) {
-    const Vec4 color = base_color(scene, surface);
+    const Vec4 color = base_color(arrays, surface);
     store(albedo, pixel, Vec3(color.x, color.y, color.z));
   }
   if (uv) {
     const bool has_uv = geometry.uv0 != kNone;
     store(uv, pixel,
-          has_uv ? interpolate(scene.uvs, geometry.uv0, geometry, surface.point) : Vec2(0.0f));
+          has_uv ? interpolate(arrays.uvs, geometry.uv0, geometry, surface.point) : Vec2(0.0f));
   }
 }
 
 // All planes but beauty, of the pixel's centre. Surfaces with alpha mode BLEND count as solid,
 // because a pixel has one depth. `motion`: NoMotion or MotionPlane.
-template <class Tracer, class Motion = NoMotion>
-OCTRACE_HD TraceStatus trace_geometry(const SceneView& scene, const RayCamera& camera,
+template <class Scene, class Tracer, class Motion = NoMotion>
+OCTRACE_HD TraceStatus trace_geometry(const Scene& scene, const RayCamera& camera,
                                       const RenderParams& params, const FramebufferView& to,
                                       std::uint32_t x, std::uint32_t y, const Tracer& tracer,
                                       const Motion& motion = {}) {
   const Ray ray = camera_ray(camera, static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f);
-  Hit hit;
+  HitOf<Scene> hit;
   const TraceStatus status = tracer.closest(scene, params, ray, &hit);
   if (status != TraceStatus::ok) return status;
   const std::uint64_t pixel = to.pixel(x, y);
@@ -96,8 +98,8 @@ OCTRACE_HD TraceStatus trace_geometry(const SceneView& scene, const RayCamera& c
 
 // A box filter of one pixel's width over params.spp stratified positions; one sample goes through
 // the centre.
-template <class Tracer>
-OCTRACE_HD TraceStatus trace_beauty(const SceneView& scene, const RayCamera& camera,
+template <class Scene, class Tracer>
+OCTRACE_HD TraceStatus trace_beauty(const Scene& scene, const RayCamera& camera,
                                     const RenderParams& params, const FramebufferView& to,
                                     std::uint32_t x, std::uint32_t y, const Tracer& tracer,
                                     RayCounts* counts) {

@@ -4,6 +4,7 @@
 #include <type_traits>
 
 #include "kernels/node.h"
+#include "kernels/ray.h"
 #include "kernels/scene_types.h"
 
 namespace octrace::kernels {
@@ -26,5 +27,13 @@ struct SceneView {
   float diagonal = 1.0f;  // of the bounds; scales ray offsets
 };
 static_assert(std::is_trivially_copyable_v<SceneView>);
+
+// What a ray finds in a kind of scene.
+template <class Scene>
+struct HitType {
+  using Type = Hit;
+};
+template <class Scene>
+using HitOf = typename HitType<Scene>::Type;
 
 }  // namespace octrace::kernels

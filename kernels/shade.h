@@ -40,7 +40,8 @@ OCTRACE_HD inline Vec3 visible_normal(Vec3 normal, Vec3 view) {
   return normalize_or(normal + (kLowest - cosine) * view, view);
 }
 
-OCTRACE_HD inline ShadingPoint make_shading_point(const SceneView& scene, const Surface& surface,
+template <class AnySurface>
+OCTRACE_HD inline ShadingPoint make_shading_point(const SceneView& scene, const AnySurface& surface,
                                                   Vec3 view, const Vec4& color) {
   const Geometry& geometry = geometry_of(scene, surface);
   const Material& material = material_of(scene, surface);

@@ -10,6 +10,7 @@
 #include "backend/app/time_options.h"
 #include "backend/batch/camera_choice.h"
 #include "backend/scene/builtin.h"
+#include "backend/scene/instances.h"
 #include "backend/util/log.h"
 #include "exporters/blender/blender.h"
 #include "exporters/gltf/gltf.h"
@@ -114,17 +115,18 @@ util::Result<std::string> export_gltf(const ExportOptions& options, const scene:
 }
 
 // Whether Blender is given the flattened scene. At a time it must be: its importer keeps the keys
-// of an animation but not what glTF has between them.
-bool is_baked(const ExportOptions& options) {
-  return options.scene.source.starts_with(scene::kBuiltinPrefix) || options.time.time();
+// of an animation but not what glTF has between them. Nor does it know instances.
+bool is_baked(const ExportOptions& options, bool has_instances) {
+  return options.scene.source.starts_with(scene::kBuiltinPrefix) || options.time.time() ||
+         has_instances;
 }
 
 util::Result<void> export_blender(const ExportOptions& options, const scene::Scene& scene,
-                                  const std::vector<NamedCamera>& cameras) {
+                                  bool has_instances, const std::vector<NamedCamera>& cameras) {
   exporters::BlenderScene job;
   job.cull = options.povray.cull;
   job.alpha = options.povray.alpha;
-  if (is_baked(options)) {
+  if (is_baked(options, has_instances)) {
     // There is no original to import, or not at this time: Blender reads what octrace writes.
     const auto path = export_gltf(options, scene);
     if (!path) return path.error();
@@ -159,10 +161,17 @@ util::Result<util::Exit> run_export(ExportOptions options) {
   options.scene.need_textures =
       options.target == Target::gltf ||
       (options.target == Target::povray && options.povray.mode == exporters::PovrayMode::scene) ||
-      (options.target == Target::blender && is_baked(options));
+      options.target == Target::blender;  // for what it cannot import itself
   set_time(options.time, options.scene);
   const auto session = open_scene(options.scene);
   if (!session) return session.error();
+  const bool has_instances = (*session)->scene.instancing != nullptr;
+  if (has_instances) {
+    // The formats know no instances, or not of a kind that every reader follows.
+    auto baked = scene::bake_instances((*session)->scene, options.scene.limits);
+    if (!baked) return baked.error();
+    (*session)->scene = std::move(*baked);
+  }
   const scene::Scene& scene = (*session)->scene;
   const auto cameras = cameras_of(options, scene, static_cast<double>(size->width) / size->height);
   if (!cameras) return cameras.error();
@@ -178,7 +187,7 @@ util::Result<util::Exit> run_export(ExportOptions options) {
   if (options.target == Target::povray) {
     done = export_povray(options, scene, *cameras);
   } else if (options.target == Target::blender) {
-    done = export_blender(options, scene, *cameras);
+    done = export_blender(options, scene, has_instances, *cameras);
   } else if (const auto path = export_gltf(options, scene); !path) {
     done = path.error();
   }

@@ -16,6 +16,7 @@
 #include "backend/image/image.h"
 #include "backend/render/device.h"
 #include "backend/render/renderer.h"
+#include "backend/scene/instances.h"
 #include "backend/util/interrupt.h"
 #include "backend/util/log.h"
 #include "backend/util/process.h"
@@ -236,6 +237,7 @@ util::Result<render::TraceStats> trace(const RenderOptions& options, const Scene
     next = session.at(options.time.next());
     if (!next) return next.error();
     settings.next = {next->positions, rays(scene::camera_at(camera, session.scene, *next))};
+    if (next->instancing) settings.next->instances = next->instancing->instances;
   }
   return renderer->render(rays(camera), settings, framebuffer);
 }

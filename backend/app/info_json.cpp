@@ -134,6 +134,10 @@ std::string info_json(const scene::SceneInfo& info, const octree::Statistics& oc
                        {"lights", info.lights_placed}, {"textures", info.textures},
                        {"texels", info.texels},        {"bytes", info.bytes},
                        {"bounds", bounds(info.bounds)}};
+  json["instances"] = {{"count", info.instances},
+                       {"meshes", info.instanced_meshes},
+                       {"triangles_kept", info.instanced_triangles_kept},
+                       {"triangles_shown", info.instanced_triangles_shown}};
   json["octree"] = octree_json(octree);
   // A name that is not UTF-8 must not stop the report.
   return json.dump(2, ' ', false, ordered_json::error_handler_t::replace) + "\n";

@@ -113,6 +113,10 @@ void flat_part(const scene::SceneInfo& info, const octree::Statistics& octree, T
   text.line("flattened: {} triangles, {} vertices, {} objects, {} lights, {} textures, {} bytes",
             info.triangles, info.vertices, info.objects, info.lights_placed, info.textures,
             info.bytes);
+  if (info.instances > 0) {
+    text.line("instances: {} of {} meshes; {} triangles kept, {} shown", info.instances,
+              info.instanced_meshes, info.instanced_triangles_kept, info.instanced_triangles_shown);
+  }
   if (info.bounds.empty) {
     text.line("bounds: empty");
   } else {

@@ -91,8 +91,10 @@ void add_limit_options(CLI::App& command, util::Limits& limits) {
   add_limit(command, "--max-json-depth", limits.max_json_depth, "nesting of JSON values", false);
   add_limit(command, "--max-scene-bytes", limits.max_scene_bytes, "flattened scene and octree",
             true);
-  add_limit(command, "--max-triangles", limits.max_triangles, "with every instance counted", false);
+  add_limit(command, "--max-triangles", limits.max_triangles,
+            "kept: a mesh with instances counts once", false);
   add_limit(command, "--max-nodes", limits.max_nodes, "glTF nodes in a file", false);
+  add_limit(command, "--max-instances", limits.max_instances, "of EXT_mesh_gpu_instancing", false);
   add_limit(command, "--max-texture-pixels", limits.max_texture_pixels, "one texture", false);
   add_limit(command, "--max-image-pixels", limits.max_image_pixels, "the rendered image", false);
   add_limit(command, "--max-spp", limits.max_spp, "samples a pixel", false);

@@ -8,6 +8,7 @@
 #include <functional>
 #include <thread>
 
+#include "backend/scene/instances.h"
 #include "backend/util/interrupt.h"
 #include "exporters/gltf/gltf.h"
 #include "exporters/povray/povray.h"
@@ -40,8 +41,16 @@ Result<ReferenceBatch> ReferenceBatch::create(const ReferenceOptions& options) {
   return ReferenceBatch(options, std::move(*scratch));
 }
 
-Result<void> ReferenceBatch::add(const SceneRequest& request, const scene::Scene& scene,
+Result<void> ReferenceBatch::add(const SceneRequest& request, const scene::Scene& shown,
                                  std::span<const scene::Camera> cameras) {
+  // Neither program knows instances: both get every copy.
+  std::optional<scene::Scene> copies;
+  if (shown.instancing) {
+    auto baked = scene::bake_instances(shown, request.limits);
+    if (!baked) return baked.error();
+    copies = std::move(*baked);
+  }
+  const scene::Scene& scene = copies ? *copies : shown;
   const std::size_t first = views_.size();
   const int width = static_cast<int>(options_.size.width);
   const int height = static_cast<int>(options_.size.height);
@@ -72,7 +81,7 @@ Result<void> ReferenceBatch::add(const SceneRequest& request, const scene::Scene
                       .alpha = options_.alpha,
                       .views = {}},
                      first};
-  if (request.source.starts_with("builtin:")) {
+  if (request.source.starts_with("builtin:") || copies) {
     entry.scene.file = scratch_.file(fmt::format("scene{}.glb", first));
     auto written = exporters::write_gltf(scene, entry.scene.file);
     if (!written) return written.error();

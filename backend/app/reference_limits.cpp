@@ -80,7 +80,8 @@ util::Result<ReferenceLimits> blender_limits(const batch::SceneRequest& request,
         "in "
         "its two directions, and here its alpha cuts out (MASK)");
   }
-  if (request.source.starts_with("builtin:")) return limits;
+  // These reach Blender as octrace writes them.
+  if (request.source.starts_with("builtin:") || scene.instancing) return limits;
 
   auto document = gltf::load(request.source, {request.limits, true});
   if (!document) return document.error();

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "backend/app/octree_json.h"
+#include "backend/scene/instances.h"
 #include "backend/util/atomic_file.h"
 #include "backend/util/version.h"
 
@@ -26,6 +27,7 @@ util::Result<void> write_stats(const std::string& path, const RenderStats& stats
                    {"textures", scene.textures.size()},
                    {"lights", scene.lights.size()},
                    {"cameras", scene.cameras.size()},
+                   {"instances", scene.instancing ? scene.instancing->instances.size() : 0},
                    {"bytes", scene.bytes()}};
   json["image"] = {{"width", stats.width},
                    {"height", stats.height},
@@ -52,16 +54,27 @@ util::Result<void> write_stats(const std::string& path, const RenderStats& stats
   return util::write_file(path, json.dump(2) + "\n");
 }
 
+namespace {
+
+std::string instances_text(const scene::Scene& scene) {
+  if (!scene.instancing) return "";
+  return fmt::format(" and {} instances of {} triangles", scene.instancing->instances.size(),
+                     scene.instancing->meshes->triangles.size());
+}
+
+}  // namespace
+
 std::string summary(const RenderStats& stats, const batch::SceneSession& session) {
   std::string names;
   for (const std::string& output : stats.outputs) {
     names += (names.empty() ? "" : ", ") + output;
   }
   return fmt::format(
-      "{}: {} triangles, load {:.0f} ms, build {:.0f} ms, trace {:.0f} ms ({:.1f} Mrays/s) on {}, "
+      "{}: {} triangles{}, load {:.0f} ms, build {:.0f} ms, trace {:.0f} ms ({:.1f} Mrays/s) on "
+      "{}, "
       "write {:.0f} ms",
-      names, session.scene.triangles.size(), session.load_ms, session.build_ms, stats.trace_ms,
-      stats.mrays_per_s(), stats.trace.device, stats.write_ms);
+      names, session.scene.triangles.size(), instances_text(session.scene), session.load_ms,
+      session.build_ms, stats.trace_ms, stats.mrays_per_s(), stats.trace.device, stats.write_ms);
 }
 
 }  // namespace octrace::app

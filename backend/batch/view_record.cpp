@@ -4,6 +4,8 @@
 #include <map>
 #include <set>
 
+#include "backend/scene/instances.h"
+
 namespace octrace::batch {
 
 using nlohmann::ordered_json;
@@ -24,6 +26,16 @@ ordered_json scene_objects_record(const scene::Scene& scene) {
   std::map<std::uint32_t, std::set<std::uint32_t>> materials;  // by object
   for (const kernels::Geometry& geometry : scene.geometries) {
     materials[geometry.object].insert(geometry.material);
+  }
+  if (scene.instancing) {
+    const scene::Instancing& instancing = *scene.instancing;
+    for (const kernels::Instance& instance : instancing.instances) {
+      const scene::MeshRange& range = instancing.ranges[instance.mesh];
+      for (std::uint32_t g = 0; g < range.geometry_count; ++g) {
+        const auto& geometry = instancing.meshes->geometries[range.first_geometry + g];
+        materials[instance.object].insert(geometry.material);
+      }
+    }
   }
   const auto name = [](const std::vector<std::string>& names, std::uint32_t index) {
     return index < names.size() ? names[index] : std::string();

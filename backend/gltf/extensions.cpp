@@ -8,17 +8,11 @@
 namespace octrace::gltf {
 namespace {
 
-constexpr std::array<std::string_view, 10> kHonoured{
-    "EXT_meshopt_compression",
-    "EXT_texture_webp",
-    "KHR_draco_mesh_compression",
-    "KHR_lights_punctual",
-    "KHR_materials_emissive_strength",
-    "KHR_materials_unlit",
-    "KHR_materials_variants",
-    "KHR_mesh_quantization",
-    "KHR_node_visibility",
-    "KHR_texture_transform",
+constexpr std::array<std::string_view, 11> kHonoured{
+    "EXT_mesh_gpu_instancing",    "EXT_meshopt_compression", "EXT_texture_webp",
+    "KHR_draco_mesh_compression", "KHR_lights_punctual",     "KHR_materials_emissive_strength",
+    "KHR_materials_unlit",        "KHR_materials_variants",  "KHR_mesh_quantization",
+    "KHR_node_visibility",        "KHR_texture_transform",
 };
 
 // These change nothing but a material, and leave glTF's own material as the fallback.

@@ -8,6 +8,7 @@
 #include "backend/gltf/draco.h"
 #include "backend/gltf/files.h"
 #include "backend/gltf/glb.h"
+#include "backend/gltf/instancing.h"
 #include "backend/gltf/json_ref.h"
 #include "backend/gltf/links.h"
 #include "backend/gltf/meshopt.h"
@@ -70,6 +71,7 @@ void load_into(Document& document, Bytes bytes, const SceneFolder& folder,
   if (issues.failed()) return;
   check_mesh_links(structure.model, issues);
   check_skin_links(structure.model, issues);
+  check_instancing_links(structure.model, options.limits, issues);
   if (issues.failed()) return;
   check_animation_links(structure.model, issues);
   if (issues.failed()) return;
@@ -80,6 +82,7 @@ void load_into(Document& document, Bytes bytes, const SceneFolder& folder,
   decode_draco(structure, options.limits, issues);
   if (issues.failed()) return;
   check_data(structure.model, issues);
+  if (!issues.failed()) check_instance_rotations(structure.model, issues);
   if (issues.failed()) return;
   document.images = load_images(structure, folder, options, issues);
   if (issues.failed()) return;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <vector>
 
+#include "backend/gltf/instancing.h"
 #include "backend/gltf/structure.h"
 
 namespace octrace::gltf {
@@ -71,6 +72,7 @@ void check_node(const JsonRef& root, const JsonRef& node, const Sizes& sizes) {
   (void)node.member("camera").as_index(sizes.cameras, "camera");
   (void)node.member("skin").as_index(sizes.skins, "skin");
   check_transform(node);
+  check_instancing(node, sizes);
   const JsonRef extensions = node.member("extensions");
   const JsonRef punctual = extensions.member("KHR_lights_punctual");
   if (punctual) (void)punctual.required("light").as_index(sizes.lights, "light");

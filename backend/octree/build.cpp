@@ -87,16 +87,21 @@ BuildInput input_of(const scene::Scene& scene, std::span<const std::uint32_t> fl
 
 }  // namespace
 
-std::vector<std::uint32_t> geometry_flags(const scene::Scene& scene) {
+std::vector<std::uint32_t> geometry_flags(std::span<const kernels::Geometry> geometries,
+                                          std::span<const kernels::Material> materials) {
   std::vector<std::uint32_t> flags;
-  flags.reserve(scene.geometries.size());
-  for (const kernels::Geometry& geometry : scene.geometries) {
-    const kernels::Material& material = scene.materials[geometry.material];
+  flags.reserve(geometries.size());
+  for (const kernels::Geometry& geometry : geometries) {
+    const kernels::Material& material = materials[geometry.material];
     flags.push_back((material.double_sided ? 0u : kernels::kCullBack) |
                     (material.alpha_mode == kernels::AlphaMode::mask ? kernels::kAlphaTest : 0u) |
                     (material.alpha_mode == kernels::AlphaMode::blend ? kernels::kBlend : 0u));
   }
   return flags;
+}
+
+std::vector<std::uint32_t> geometry_flags(const scene::Scene& scene) {
+  return geometry_flags(scene.geometries, scene.materials);
 }
 
 const char* name_of(Builder builder) {
@@ -143,13 +148,19 @@ util::Result<Octree> build(const BuildInput& input, const BuildOptions& options)
 }
 
 util::Result<Octree> build(const scene::Scene& scene, const BuildOptions& options) {
-  const std::vector<std::uint32_t> flags = geometry_flags(scene);
-  return build(input_of(scene, flags), options);
+  const std::vector<std::uint32_t> flags = geometry_flags(scene.geometries, scene.materials);
+  util::Result<Octree> octree = build(input_of(scene, flags), options);
+  if (!octree || !scene.instancing) return octree;
+  util::Result<InstanceLevels> levels = build_instance_levels(scene, options);
+  if (!levels) return levels.error();
+  octree->instances = std::move(*levels);
+  return octree;
 }
 
 util::Result<void> verify(const Octree& octree, const scene::Scene& scene) {
-  const std::vector<std::uint32_t> flags = geometry_flags(scene);
-  return verify(octree, input_of(scene, flags));
+  const std::vector<std::uint32_t> flags = geometry_flags(scene.geometries, scene.materials);
+  if (auto ok = verify(octree, input_of(scene, flags)); !ok) return ok;
+  return verify_instance_levels(octree.instances, scene);
 }
 
 }  // namespace octrace::octree

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "backend/octree/instance_levels.h"
 #include "backend/scene/scene.h"
 #include "backend/util/result.h"
 #include "kernels/node.h"
@@ -36,6 +37,7 @@ struct Statistics {
 struct Octree {
   std::vector<kernels::Node> nodes;
   std::vector<kernels::LeafTriangle> triangles;
+  InstanceLevels instances;  // empty where the scene has none
 
   kernels::OctreeView view() const {
     return {{nodes.data(), nodes.size()}, {triangles.data(), triangles.size()}};

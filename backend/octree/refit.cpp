@@ -148,7 +148,9 @@ util::Result<void> update(const scene::Scene& scene, const BuildOptions& build_o
   } else {
     tbb::task_arena(static_cast<int>(build_options.threads)).execute(follow);
   }
-  if (upkeep.cost <= options.max_cost_growth * upkeep.built_cost) return {};
+  if (upkeep.cost <= options.max_cost_growth * upkeep.built_cost) {
+    return update_instance_levels(scene, build_options, octree.instances);
+  }
   util::Result<Octree> built = build(scene, build_options);
   if (!built) return built.error();
   octree = std::move(*built);

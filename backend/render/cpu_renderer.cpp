@@ -7,6 +7,7 @@
 #include "backend/render/renderer.h"
 #include "backend/render/tiles.h"
 #include "kernels/cpu/intersect.h"
+#include "kernels/instance_motion.h"
 #include "kernels/pixel.h"
 
 namespace octrace::render {
@@ -35,7 +36,7 @@ util::Error trace_error(const TileFailure& failure) {
 }
 
 struct View {
-  const kernels::SceneView& scene;
+  const kernels::InstancedSceneView& scene;
   const kernels::RayCamera& camera;
   const kernels::RenderParams& params;
   kernels::FramebufferView target;
@@ -48,27 +49,28 @@ struct TileCounts {
   kernels::RayCounts beauty;
 };
 
-TraceStatus trace_pixel(const View& view, const kernels::CpuTracer& tracer, std::uint32_t x,
-                        std::uint32_t y, TileCounts* counts) {
+template <class Scene>
+TraceStatus trace_pixel(const View& view, const Scene& scene, const kernels::CpuTracer& tracer,
+                        std::uint32_t x, std::uint32_t y, TileCounts* counts) {
   if (view.geometry) {
     ++counts->camera;
     const TraceStatus status =
         view.motion == nullptr
-            ? trace_geometry(view.scene, view.camera, view.params, view.target, x, y, tracer)
-            : trace_geometry(view.scene, view.camera, view.params, view.target, x, y, tracer,
+            ? trace_geometry(scene, view.camera, view.params, view.target, x, y, tracer)
+            : trace_geometry(scene, view.camera, view.params, view.target, x, y, tracer,
                              kernels::MotionPlane{*view.motion});
     if (status != TraceStatus::ok) return status;
   }
   if (!view.beauty) return TraceStatus::ok;
-  return trace_beauty(view.scene, view.camera, view.params, view.target, x, y, tracer,
-                      &counts->beauty);
+  return trace_beauty(scene, view.camera, view.params, view.target, x, y, tracer, &counts->beauty);
 }
 
-TileFailure trace_tile(const View& view, const kernels::CpuTracer& tracer, const Tile& tile,
-                       TileCounts* counts) {
+template <class Scene>
+TileFailure trace_tile(const View& view, const Scene& scene, const kernels::CpuTracer& tracer,
+                       const Tile& tile, TileCounts* counts) {
   for (std::uint32_t y = tile.y0; y < tile.y1; ++y) {
     for (std::uint32_t x = tile.x0; x < tile.x1; ++x) {
-      const TraceStatus status = trace_pixel(view, tracer, x, y, counts);
+      const TraceStatus status = trace_pixel(view, scene, tracer, x, y, counts);
       if (status != TraceStatus::ok) return {status, x, y};
     }
   }
@@ -90,14 +92,11 @@ class CpuRenderer final : public Renderer {
   }
 
  private:
-  void look() {
-    scene_ = source_.view();
-    scene_.octree = octree_.view();
-  }
+  void look() { scene_ = octree::instanced_view(source_, octree_); }
 
   const scene::Scene& source_;
   const octree::Octree& octree_;
-  kernels::SceneView scene_;
+  kernels::InstancedSceneView scene_;
   kernels::CpuTracer tracer_;
 };
 
@@ -134,7 +133,11 @@ util::Result<TraceStats> CpuRenderer::render(const kernels::RayCamera& camera,
   job.cancel = settings.cancel;
   job.work = [&](const Tile& tile) {
     TileCounts counts;
-    const TileFailure result = trace_tile(view, tracer_, tile, &counts);
+    // Scenes without instances are traced by code that knows none.
+    const kernels::SceneView& world = scene_;
+    const TileFailure result = scene_.top.nodes.empty()
+                                   ? trace_tile(view, world, tracer_, tile, &counts)
+                                   : trace_tile(view, scene_, tracer_, tile, &counts);
     const std::lock_guard lock(mutex);
     stats.camera_rays += counts.camera;
     stats.beauty_rays += counts.beauty.beauty;

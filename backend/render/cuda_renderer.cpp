@@ -102,17 +102,24 @@ util::Result<void> CudaRenderer::refresh(const scene::SceneChanges& changes) {
 util::Result<kernels::MotionView> CudaRenderer::upload_motion(const kernels::RayCamera& camera,
                                                               const NextFrame& next) {
   kernels::MotionView motion = make_motion_view(camera, next);
-  const std::uint64_t bytes = next.positions.size_bytes();
-  if (bytes == 0) return motion;
-  Status status = next_positions_.reserve(bytes);
-  if (status.out_of_memory()) return memory_error("the next frame", bytes, device_);
-  if (status.ok()) {
-    status = kernels::cuda::copy_to_device(next_positions_.data(), next.positions.data(), bytes,
-                                           nullptr);
+  Status status;
+  const auto upload = [&]<class T>(kernels::Span<T>& span, DeviceMemory& memory) {
+    const std::uint64_t bytes = span.size * sizeof(T);
+    if (bytes == 0 || !status.ok()) return;
+    status = memory.reserve(bytes);
+    if (status.ok()) {
+      status = kernels::cuda::copy_to_device(memory.data(), span.data, bytes, nullptr);
+    }
+    span.data = static_cast<const T*>(memory.data());
+  };
+  upload(motion.next_positions, next_positions_);
+  upload(motion.next_instances, next_instances_);
+  if (status.out_of_memory()) {
+    return memory_error("the next frame", next.positions.size_bytes() + next.instances.size_bytes(),
+                        device_);
   }
   if (status.ok()) status = kernels::cuda::synchronize(nullptr);
   if (!status.ok()) return cuda_error(status);
-  motion.next_positions.data = static_cast<const kernels::Vec3*>(next_positions_.data());
   return motion;
 }
 
@@ -144,9 +151,9 @@ util::Result<std::uint32_t> CudaRenderer::choose_rows(const Framebuffer& framebu
   return rows;
 }
 
-Status CudaRenderer::start(Band& band, const kernels::cuda::View& whole,
+Status CudaRenderer::start(Band& band, const kernels::cuda::InstancedView& whole,
                            const Framebuffer& framebuffer) {
-  kernels::cuda::View view = whole;
+  kernels::cuda::InstancedView view = whole;
   view.target = {};
   view.target.width = framebuffer.width();
   view.target.height = band.rows;
@@ -160,7 +167,11 @@ Status CudaRenderer::start(Band& band, const kernels::cuda::View& whole,
   const kernels::cuda::Stream stream = band.stream.get();
   Status s = kernels::cuda::clear(report, sizeof(Report), stream);
   if (s.ok()) s = kernels::cuda::record_event(band.begun.get(), stream);
-  if (s.ok()) s = kernels::cuda::launch_view(view, report, stream);
+  if (s.ok()) {
+    s = view.instanced.top.nodes.empty()
+            ? kernels::cuda::launch_view(view, report, stream)
+            : kernels::cuda::launch_instanced_view(view, report, stream);
+  }
   if (s.ok()) s = kernels::cuda::record_event(band.traced.get(), stream);
   const std::uint64_t bytes = bytes_a_row(framebuffer) * band.rows;
   if (s.ok()) s = kernels::cuda::copy_to_host(band.host_planes.data(), planes, bytes, stream);
@@ -207,14 +218,15 @@ util::Result<TraceStats> CudaRenderer::render(const kernels::RayCamera& camera,
   if (Status s = kernels::cuda::select_device(device_); !s.ok()) return cuda_error(s);
   const util::Result<std::uint32_t> rows = choose_rows(framebuffer);
   if (!rows) return rows.error();
-  kernels::cuda::View view{scene_.view(),
-                           camera,
-                           settings.params,
-                           {},
-                           geometry.any(),
-                           beauty,
-                           geometry.test(static_cast<std::size_t>(Aov::motion)),
-                           {}};
+  kernels::cuda::InstancedView view{{scene_.view(),
+                                     camera,
+                                     settings.params,
+                                     {},
+                                     geometry.any(),
+                                     beauty,
+                                     geometry.test(static_cast<std::size_t>(Aov::motion)),
+                                     {}},
+                                    scene_.view()};
   if (view.has_motion && settings.next) {
     const util::Result<kernels::MotionView> motion = upload_motion(camera, *settings.next);
     if (!motion) return motion.error();

@@ -36,7 +36,7 @@ class CudaRenderer final : public Renderer {
   util::Result<std::uint32_t> choose_rows(const Framebuffer& framebuffer);
   util::Result<kernels::MotionView> upload_motion(const kernels::RayCamera& camera,
                                                   const NextFrame& next);
-  kernels::cuda::Status start(Band& band, const kernels::cuda::View& view,
+  kernels::cuda::Status start(Band& band, const kernels::cuda::InstancedView& view,
                               const Framebuffer& framebuffer);
   util::Result<void> finish(Band& band, Framebuffer& framebuffer, TraceStats& stats);
 
@@ -45,7 +45,7 @@ class CudaRenderer final : public Renderer {
   int device_ = 0;
   std::string device_name_;
   DeviceScene scene_;
-  DeviceMemory next_positions_;  // of the motion plane's next frame
+  DeviceMemory next_positions_, next_instances_;  // of the motion plane's next frame
   std::array<Band, 2> bands_;
 };
 

@@ -19,9 +19,8 @@ std::uint64_t aligned(std::uint64_t bytes) {
   return (bytes + kAlignment - 1) / kAlignment * kAlignment;
 }
 
-// Calls visit(span) for every array of the view. One list serves sizes, copies and pointers.
 template <class Visit>
-void for_each_array(kernels::SceneView& view, Visit&& visit) {
+void for_each_geometry_array(kernels::SceneView& view, Visit&& visit) {
   visit(view.octree.nodes);
   visit(view.octree.triangles);
   visit(view.positions);
@@ -32,6 +31,17 @@ void for_each_array(kernels::SceneView& view, Visit&& visit) {
   visit(view.tangents);
   visit(view.uvs);
   visit(view.colors);
+}
+
+// Calls visit(span) for every array of the view. One list serves sizes, copies and pointers.
+template <class Visit>
+void for_each_array(kernels::InstancedSceneView& view, Visit&& visit) {
+  for_each_geometry_array(view, visit);
+  for_each_geometry_array(view.meshes, visit);
+  visit(view.top.nodes);
+  visit(view.top.triangles);
+  visit(view.roots);
+  visit(view.instances);
   visit(view.materials);
   visit(view.textures);
   visit(view.texels);
@@ -40,10 +50,13 @@ void for_each_array(kernels::SceneView& view, Visit&& visit) {
 
 constexpr std::uint64_t kTableEntries = 256;
 
-kernels::SceneView host_view(const scene::Scene& scene, const octree::Octree& octree) {
-  kernels::SceneView view = scene.view();
-  view.octree = octree.view();
-  return view;
+// What meshes have from the scene that shows them.
+void share_surfaces(kernels::InstancedSceneView& view) {
+  view.meshes.materials = view.materials;
+  view.meshes.textures = view.textures;
+  view.meshes.texels = view.texels;
+  view.meshes.lights = view.lights;
+  view.meshes.srgb_to_linear = view.srgb_to_linear;
 }
 
 }  // namespace
@@ -55,7 +68,7 @@ util::Error cuda_error(const Status& status) {
 }
 
 std::uint64_t DeviceScene::bytes_needed(const scene::Scene& scene, const octree::Octree& octree) {
-  kernels::SceneView view = host_view(scene, octree);
+  kernels::InstancedSceneView view = octree::instanced_view(scene, octree);
   std::uint64_t bytes = aligned(kTableEntries * sizeof(float));
   for_each_array(view, [&]<class T>(Span<T>& span) { bytes += aligned(span.size * sizeof(T)); });
   return bytes;
@@ -66,7 +79,7 @@ Status DeviceScene::upload(const scene::Scene& scene, const octree::Octree& octr
   bytes_ = bytes_needed(scene, octree);
   Status status = memory_.reserve(bytes_);
   if (!status.ok()) return status;
-  view_ = host_view(scene, octree);
+  view_ = octree::instanced_view(scene, octree);
   auto* next = static_cast<std::byte*>(memory_.data());
   const auto place = [&](const void* from, std::uint64_t bytes) -> const void* {
     void* to = next;
@@ -79,6 +92,7 @@ Status DeviceScene::upload(const scene::Scene& scene, const octree::Octree& octr
   });
   view_.srgb_to_linear =
       static_cast<const float*>(place(view_.srgb_to_linear, kTableEntries * sizeof(float)));
+  share_surfaces(view_);
   if (status.ok()) status = kernels::cuda::synchronize(nullptr);
   seconds_ = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return status;
@@ -86,9 +100,10 @@ Status DeviceScene::upload(const scene::Scene& scene, const octree::Octree& octr
 
 Status DeviceScene::update(const scene::Scene& scene, const octree::Octree& octree,
                            const scene::SceneChanges& changes) {
-  kernels::SceneView from = host_view(scene, octree);
-  const kernels::SceneView to = view_;
-  if (from.octree.nodes.size != to.octree.nodes.size || from.lights.size != to.lights.size) {
+  const kernels::InstancedSceneView from = octree::instanced_view(scene, octree);
+  const kernels::InstancedSceneView to = view_;
+  if (from.octree.nodes.size != to.octree.nodes.size || from.lights.size != to.lights.size ||
+      changes.instances) {
     return upload(scene, octree);
   }
   const auto start = std::chrono::steady_clock::now();

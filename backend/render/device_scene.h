@@ -20,14 +20,15 @@ class DeviceScene {
   kernels::cuda::Status update(const scene::Scene& scene, const octree::Octree& octree,
                                const scene::SceneChanges& changes);
 
-  const kernels::SceneView& view() const { return view_; }  // pointers into device memory
+  // Pointers into device memory.
+  const kernels::InstancedSceneView& view() const { return view_; }
   std::uint64_t bytes() const { return bytes_; }
   double upload_seconds() const { return seconds_; }
 
   static std::uint64_t bytes_needed(const scene::Scene& scene, const octree::Octree& octree);
 
  private:
-  kernels::SceneView view_;
+  kernels::InstancedSceneView view_;
   DeviceMemory memory_;
   std::uint64_t bytes_ = 0;
   double seconds_ = 0.0;

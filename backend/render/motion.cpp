@@ -29,7 +29,8 @@ kernels::Projection make_projection(const kernels::RayCamera& camera) {
 kernels::MotionView make_motion_view(const kernels::RayCamera& now, const NextFrame& next) {
   return {{next.positions.data(), next.positions.size()},
           make_projection(now),
-          make_projection(next.camera)};
+          make_projection(next.camera),
+          {next.instances.data(), next.instances.size()}};
 }
 
 }  // namespace octrace::render

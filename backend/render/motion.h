@@ -4,6 +4,7 @@
 #include <span>
 
 #include "kernels/camera.h"
+#include "kernels/instance.h"
 #include "kernels/motion.h"
 
 namespace octrace::render {
@@ -11,6 +12,7 @@ namespace octrace::render {
 struct NextFrame {
   std::span<const kernels::Vec3> positions;  // as Scene::positions; empty: no vertex moves
   kernels::RayCamera camera;
+  std::span<const kernels::Instance> instances = {};  // empty: none moves
 };
 
 // Computed in double and rounded once. A camera that has no inverse gives one that sees nothing.

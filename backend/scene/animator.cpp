@@ -98,6 +98,17 @@ std::vector<bool> Animator::moved_geometries(const Placement& to) const {
   return moved;
 }
 
+Animator::InstanceMoves Animator::moved_instances(const Placement& to) const {
+  InstanceMoves moves;
+  for (const auto& shown : plan_.instances.nodes) {
+    if (!same_bits(now_.worlds[shown.node], to.worlds[shown.node])) moves.any = true;
+    if (!same_bits(now_.pose.weights[shown.node], to.pose.weights[shown.node])) {
+      moves.any = moves.meshes = true;
+    }
+  }
+  return moves;
+}
+
 util::Result<SceneChanges> Animator::move_to(Time time, Scene& scene) {
   if (!moves()) return SceneChanges{};
   Placement to = placement(time);
@@ -109,8 +120,18 @@ util::Result<SceneChanges> Animator::move_to(Time time, Scene& scene) {
   broken_ = true;
   auto changes = replace_geometry(document_, part, to.pose, to.worlds, scene, winding_);
   if (!changes) return changes.error();
+  const InstanceMoves moves = moved_instances(to);
+  if (was_broken || moves.any) {
+    scene.bounds = bounds_of(scene.positions);
+    auto placed_instances = place_instances(document_, plan_.instances, to.pose, to.worlds,
+                                            !was_broken && !moves.meshes, scene);
+    if (!placed_instances) return placed_instances.error();
+  } else if (changes->positions) {
+    add_instance_bounds(scene);
+  }
   broken_ = false;
-  if (was_broken) *changes = {true, true, true, true, true, true, true, true};
+  if (was_broken) *changes = {true, true, true, true, true, true, true, true, false};
+  changes->instances = scene.instancing && (was_broken || moves.any);
   changes->cameras |= !std::equal(
       placed.cameras.begin(), placed.cameras.end(), scene.cameras.begin(), scene.cameras.end(),
       [](const Camera& a, const Camera& b) { return same_bits(a.matrix, b.matrix); });
@@ -131,6 +152,17 @@ util::Result<Moment> Animator::at(Time time, const Scene& scene) const {
   Scene placed;
   if (auto ok = place_cameras(document_, plan_.nodes, to.worlds, placed); !ok) return ok.error();
   moment.cameras = std::move(placed.cameras);
+  if (scene.instancing && moved_instances(to).any) {
+    placed.instancing = scene.instancing;
+    if (auto ok = place_instances(document_, plan_.instances, to.pose, to.worlds, true, placed);
+        !ok) {
+      return ok.error();
+    }
+    // One that is left out at one of the two moments leaves no pairs.
+    if (placed.instancing->instances.size() == scene.instancing->instances.size()) {
+      moment.instancing = placed.instancing;
+    }
+  }
   const GeometryPlan part = part_of(plan_.geometry, moved_geometries(to));
   if (part.sources.empty()) return moment;
   moment.positions = scene.positions;

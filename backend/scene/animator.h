@@ -24,6 +24,7 @@ inline constexpr double kDefaultFps = 24.0;
 struct Moment {
   std::vector<kernels::Vec3> positions;  // as Scene::positions; empty: where the scene has them
   std::vector<Camera> cameras;           // as Scene::cameras
+  std::shared_ptr<const Instancing> instancing;  // null: where the scene has them
 };
 
 // Where a camera of the scene stands in that moment; one that is not of the scene stays.
@@ -57,7 +58,11 @@ class Animator {
   };
   Animator() = default;
   Placement placement(Time time) const;
+  struct InstanceMoves {
+    bool any = false, meshes = false;
+  };
   std::vector<bool> moved_geometries(const Placement& to) const;
+  InstanceMoves moved_instances(const Placement& to) const;
   bool any_moved(const std::vector<bool>& nodes, const Placement& to) const;
 
   gltf::Document document_;

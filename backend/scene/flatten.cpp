@@ -135,9 +135,14 @@ util::Result<ScenePlan> plan_scene(const gltf::Document& document, const Flatten
   ScenePlan plan;
   plan.nodes = reachable_nodes(model, *roots);
   plan.visible = visible_nodes(model, plan.nodes);
-  auto geometry = plan_geometry(document, plan.visible, *variant, options.limits);
+  auto instances = plan_instances(document, plan.visible, *variant, options.limits);
+  if (!instances) return instances.error();
+  plan.instances = std::move(*instances);
+  auto geometry = plan_geometry(document, plan.instances.plain_nodes, *variant, options.limits);
   if (!geometry) return geometry.error();
   plan.geometry = std::move(*geometry);
+  auto fits = check_sum(document, plan.geometry, plan.instances, options.limits);
+  if (!fits) return fits.error();
   return plan;
 }
 
@@ -146,13 +151,19 @@ util::Result<Scene> place_scene(const gltf::Document& document, const ScenePlan&
   const tinygltf::Model& model = document.model;
   Scene scene;
   scene.warnings = plan.geometry.warnings;
+  const GeometryPlan& meshes = plan.instances.meshes;
+  scene.warnings.insert(scene.warnings.end(), meshes.warnings.begin(), meshes.warnings.end());
   const std::vector<glm::dmat4> worlds = world_matrices(model, pose);
   if (auto ok = place_geometry(document, plan.geometry, pose, worlds, scene, winding); !ok) {
     return ok.error();
   }
+  if (auto ok = place_instances(document, plan.instances, pose, worlds, false, scene); !ok) {
+    return ok.error();
+  }
   if (auto ok = place_cameras(document, plan.nodes, worlds, scene); !ok) return ok.error();
   if (auto ok = place_lights(document, plan.visible, worlds, scene); !ok) return ok.error();
-  if (auto ok = place_materials(document, options, plan.geometry.default_material, scene); !ok) {
+  const bool default_material = plan.geometry.default_material || meshes.default_material;
+  if (auto ok = place_materials(document, options, default_material, scene); !ok) {
     return ok.error();
   }
   drop_duplicates(scene.warnings);
@@ -162,6 +173,7 @@ util::Result<Scene> place_scene(const gltf::Document& document, const ScenePlan&
     const int mesh = model.nodes[i].mesh;
     scene.object_meshes.push_back(mesh < 0 ? "" : name_of(model.meshes, mesh, "mesh"));
   }
+  append_instance_names(document, plan.instances, scene);
   return scene;
 }
 

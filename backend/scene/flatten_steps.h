@@ -5,13 +5,15 @@
 
 #include "backend/scene/flatten.h"
 #include "backend/scene/flatten_geometry.h"
+#include "backend/scene/instances.h"
 
 namespace octrace::scene {
 
 struct ScenePlan {
   std::vector<int> nodes;    // those of the scene, ascending
   std::vector<int> visible;  // those of them that KHR_node_visibility does not hide
-  GeometryPlan geometry;
+  GeometryPlan geometry;     // of visible nodes that are shown once
+  InstancePlan instances;    // of the other visible ones
 };
 
 // What does not depend on time. Errors as flatten().

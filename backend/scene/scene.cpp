@@ -3,6 +3,8 @@
 #include <array>
 #include <cmath>
 
+#include "backend/scene/instances.h"
+
 namespace octrace::scene {
 
 namespace {
@@ -63,7 +65,7 @@ std::uint64_t Scene::bytes() const {
   return bytes_of(positions) + bytes_of(triangles) + bytes_of(triangle_geometry) +
          bytes_of(geometries) + bytes_of(normals) + bytes_of(tangents) + bytes_of(uvs) +
          bytes_of(colors) + bytes_of(materials) + bytes_of(textures) + bytes_of(texels) +
-         bytes_of(lights);
+         bytes_of(lights) + (instancing ? instancing->bytes() : 0);
 }
 
 Bounds bounds_of(const std::vector<kernels::Vec3>& positions) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -10,6 +11,8 @@
 #include "kernels/scene_view.h"
 
 namespace octrace::scene {
+
+struct Instancing;  // instances.h
 
 struct Bounds {
   kernels::Vec3 lower{0.0f};
@@ -34,8 +37,12 @@ struct Scene {
   std::vector<std::uint32_t> texels;
   std::vector<kernels::Light> lights;
 
+  // Meshes that are shown many times, beside the arrays above, which hold nothing of them; null:
+  // none. What knows no instances takes bake_instances() of the scene.
+  std::shared_ptr<const Instancing> instancing;
+
   std::vector<Camera> cameras;              // placed in the world, in node order
-  std::vector<std::string> object_names;    // by object index (glTF node index)
+  std::vector<std::string> object_names;    // by object index: glTF nodes, then instances
   std::vector<std::string> object_meshes;   // by object index; empty: the object has no mesh
   std::vector<std::string> material_names;  // by material index
   Bounds bounds;

@@ -7,6 +7,7 @@
 #include <set>
 
 #include "backend/scene/flatten.h"
+#include "backend/scene/instances.h"
 #include "backend/scene/names.h"
 #include "backend/scene/triangulate.h"
 
@@ -23,6 +24,13 @@ void collect_flattened(const Scene& scene, SceneInfo& info) {
   info.geometries = scene.geometries.size();
   info.triangles = scene.triangles.size();
   info.vertices = scene.positions.size();
+  if (scene.instancing) {
+    info.instances = scene.instancing->instances.size();
+    info.instanced_meshes = scene.instancing->ranges.size();
+    info.instanced_triangles_kept = scene.instancing->meshes->triangles.size();
+    info.instanced_triangles_shown = scene.instancing->triangles;
+    info.objects += info.instances;
+  }
   info.lights_placed = scene.lights.size();
   info.textures = scene.textures.size();
   info.texels = scene.texels.size();

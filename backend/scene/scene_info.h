@@ -87,10 +87,13 @@ struct SceneInfo {
   std::vector<VariantEntry> variants;
   std::vector<ExtensionEntry> extensions;  // used and required ones, sorted by name
 
-  // The flattened scene, with every instance counted.
-  std::uint64_t objects = 0;     // nodes that carry triangles
-  std::uint64_t geometries = 0;  // primitives of nodes
-  std::uint64_t triangles = 0, vertices = 0;
+  // The flattened scene, every node counted.
+  std::uint64_t objects = 0;                  // nodes that carry triangles
+  std::uint64_t geometries = 0;               // primitives of nodes
+  std::uint64_t triangles = 0, vertices = 0;  // without those of instances
+  // Of EXT_mesh_gpu_instancing: meshes and their triangles as kept, once each, and as shown.
+  std::uint64_t instances = 0, instanced_meshes = 0;
+  std::uint64_t instanced_triangles_kept = 0, instanced_triangles_shown = 0;
   std::uint64_t lights_placed = 0, textures = 0, texels = 0;
   std::uint64_t bytes = 0;  // in memory, without the octree
   Bounds bounds;

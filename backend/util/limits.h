@@ -13,6 +13,7 @@ struct Limits {
   std::uint64_t max_scene_bytes = 64ull << 30;    // --max-scene-bytes: flattened scene and octree
   std::uint64_t max_triangles = 1ull << 30;       // --max-triangles: flattened, below 2^31
   std::uint64_t max_nodes = 1ull << 24;           // --max-nodes: glTF nodes in a file
+  std::uint64_t max_instances = 1ull << 24;       // --max-instances: of EXT_mesh_gpu_instancing
   std::uint64_t max_texture_pixels = 1ull << 28;  // --max-texture-pixels: one image, width * height
   std::uint64_t max_image_pixels = 1ull << 28;    // --max-image-pixels: the rendered image
   std::uint64_t max_spp = 1ull << 16;             // --max-spp

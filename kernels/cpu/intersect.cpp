@@ -110,6 +110,17 @@ HWY_ATTR TraceStatus transmittance(const SceneView& scene, const RenderParams& p
   return shadow_transmittance(scene, params, ray, SimdChildTest{}, transmittance);
 }
 
+HWY_ATTR TraceStatus instanced_closest(const InstancedSceneView& scene, const RenderParams& params,
+                                       const Ray& ray, InstancedHit* hit) {
+  return closest_hit(scene, params, ray, SimdChildTest{}, hit);
+}
+
+HWY_ATTR TraceStatus instanced_transmittance(const InstancedSceneView& scene,
+                                             const RenderParams& params, const Ray& ray,
+                                             float* transmittance) {
+  return shadow_transmittance(scene, params, ray, SimdChildTest{}, transmittance);
+}
+
 // Highway counts AVX-512 as the third AVX.
 HWY_ATTR const char* instruction_set() {
   return HWY_TARGET == HWY_AVX3 || HWY_TARGET == HWY_AVX3_DL ? "AVX-512"
@@ -124,6 +135,8 @@ namespace octrace::kernels {
 
 HWY_EXPORT(closest);
 HWY_EXPORT(transmittance);
+HWY_EXPORT(instanced_closest);
+HWY_EXPORT(instanced_transmittance);
 HWY_EXPORT(instruction_set);
 
 CpuTracer::CpuTracer() {
@@ -131,6 +144,8 @@ CpuTracer::CpuTracer() {
   const auto index = hwy::GetChosenTarget().GetIndex();
   closest_ = HWY_DISPATCH_TABLE(closest)[index];
   transmittance_ = HWY_DISPATCH_TABLE(transmittance)[index];
+  instanced_closest_ = HWY_DISPATCH_TABLE(instanced_closest)[index];
+  instanced_transmittance_ = HWY_DISPATCH_TABLE(instanced_transmittance)[index];
   instruction_set_ = HWY_DISPATCH_TABLE(instruction_set)[index]();
 }
 

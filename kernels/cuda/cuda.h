@@ -6,6 +6,7 @@
 
 #include "kernels/aov.h"
 #include "kernels/camera.h"
+#include "kernels/instance.h"
 #include "kernels/motion.h"
 #include "kernels/node.h"
 #include "kernels/ray.h"
@@ -79,6 +80,12 @@ struct View {
   MotionView motion;
 };
 Status launch_view(const View& view, Report* report, Stream stream);
+
+// The same of a scene with instances, by kernels of their own. View::scene is not looked at.
+struct InstancedView : View {
+  InstancedSceneView instanced;
+};
+Status launch_instanced_view(const InstancedView& view, Report* report, Stream stream);
 
 // Closest or any hit of a buffer of rays, geometry only: culling as params say, alpha ignored.
 // Any-hit queries set triangle to 0 where something was hit and to kNone elsewhere.

@@ -9,6 +9,8 @@
 
 #include "tests/gpu/devices.h"
 #include "tests/gpu/load.h"
+#include "tests/support/instanced_scene.h"
+#include "tests/support/intensity.h"
 #include "tests/support/meshes.h"
 
 namespace octrace::tests {
@@ -100,6 +102,36 @@ TEST_P(OnDevice, GeometryHasTheBitsOfTheCpu) {
     Framebuffer found = render_on(GetParam(), *loaded, 640, 360, geometry_aovs());
     EXPECT_EQ(0u, differing_bits(expected, found)) << source;
   }
+}
+
+TEST_P(OnDevice, InstancesHaveTheBitsOfTheCpu) {
+  for (const InstanceShape& shape : instance_shapes()) {
+    LoadedScene loaded;
+    loaded.scene = make_instanced_scene(shape, 300, seed());
+    loaded.octree = std::move(*octree::build(loaded.scene, {}));
+    Framebuffer expected =
+        render_on({render::DeviceKind::cpu, 0}, loaded, 640, 360, geometry_aovs());
+    Framebuffer found = render_on(GetParam(), loaded, 640, 360, geometry_aovs());
+    EXPECT_EQ(0u, differing_bits(expected, found)) << shape.name;
+    const auto ids = found.uints(Aov::object_id);
+    EXPECT_GT(std::count_if(ids.begin(), ids.end(), [](std::uint32_t id) { return id > 3; }), 0)
+        << shape.name << ": no instances in view";
+  }
+}
+
+TEST_P(OnDevice, BeautyOfInstancesIsTheCpusWithinRounding) {
+  LoadedScene loaded;
+  loaded.scene = make_instanced_scene(instance_shapes().front(), 300, seed());
+  loaded.octree = std::move(*octree::build(loaded.scene, {}));
+  const AovSet beauty = AovSet().set(static_cast<std::size_t>(Aov::beauty));
+  const Framebuffer expected = render_on({render::DeviceKind::cpu, 0}, loaded, 320, 180, beauty, 4);
+  const Framebuffer found = render_on(GetParam(), loaded, 320, 180, beauty, 4);
+  std::size_t differing = 0;
+  const auto a = expected.floats(Aov::beauty), b = found.floats(Aov::beauty);
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    differing += !(std::abs(a[i] - b[i]) <= 1e-4 * std::max(std::abs(a[i]), 1e-3f));
+  }
+  EXPECT_LE(differing, a.size() / 1000);
 }
 
 // Larger than a band, so that bands and their seams are part of it.

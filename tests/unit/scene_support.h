@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdint>
 #include <cstring>
 #include <filesystem>
@@ -92,8 +93,9 @@ class GltfFile {
 
   util::Result<gltf::Document> load() const {
     const auto* test = ::testing::UnitTest::GetInstance()->current_test_info();
-    const std::string path =
-        ::testing::TempDir() + "octrace_" + test->test_suite_name() + "_" + test->name() + ".gltf";
+    std::string name = std::string(test->test_suite_name()) + "_" + test->name();
+    std::replace(name.begin(), name.end(), '/', '_');  // of a test with parameters
+    const std::string path = ::testing::TempDir() + "octrace_" + name + ".gltf";
     std::ofstream(path) << text();
     auto document = gltf::load(path, {});
     std::filesystem::remove(path);
