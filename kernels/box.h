@@ -34,9 +34,10 @@ struct SlabRay {
 // Directions count as no closer to zero than 2^-80, which keeps 1/d and its products with
 // coordinates below kMaxCoordinate finite, and which the padding covers: over the box's distance a
 // ray strays from the axis plane by less than 2^-50 of it.
+inline constexpr float kTinyDirection = 8.271806125530277e-25f;  // 2^-80
+
 OCTRACE_HD OCTRACE_FORCE_INLINE float safe_inverse(float d) {
-  constexpr float kTiny = 8.271806125530277e-25f;  // 2^-80
-  if (abs_of(d) < kTiny) d = d < 0.0f ? -kTiny : kTiny;
+  if (abs_of(d) < kTinyDirection) d = d < 0.0f ? -kTinyDirection : kTinyDirection;
   return reciprocal_rn(d);
 }
 

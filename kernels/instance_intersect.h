@@ -93,7 +93,8 @@ struct MeshTransmittanceLeaf {
     }
     const float t = add_rn(bounds.start, found.t);
     if (!(t >= bounds.tmin && t <= bounds.tmax)) return false;
-    return TransmittanceLeaf::add_surface(scene.meshes, params, triangle, found, opacity);
+    return dim(scene.meshes, params, {triangle.triangle, triangle.flags, triangle.geometry}, found,
+               &opacity);
   }
 };
 
@@ -120,7 +121,7 @@ struct InstanceTransmittanceLeaf {
     MeshTransmittanceLeaf leaf{
         scene, params, octree, walk.ray, make_triangle_ray(bounds.ray.direction), bounds, opacity};
     status = traverse(octree, walk, child_test, leaf);
-    return status != TraceStatus::ok || opacity >= TransmittanceLeaf::kBlocked;
+    return status != TraceStatus::ok || opacity >= kOpacityBlocked;
   }
 };
 
@@ -153,13 +154,13 @@ OCTRACE_HD OCTRACE_FORCE_INLINE TraceStatus shadow_transmittance(const Instanced
   TransmittanceLeaf world_leaf = transmittance_leaf(scene, params, world_walk, ray);
   const TraceStatus world = traverse(scene.octree, world_walk, child_test, world_leaf);
   *transmittance = 0.0f;
-  if (world != TraceStatus::ok || world_leaf.opacity >= TransmittanceLeaf::kBlocked) return world;
+  if (world != TraceStatus::ok || world_leaf.opacity >= kOpacityBlocked) return world;
   Walk walk(scene.top, ray);
   InstanceTransmittanceLeaf<ChildTest> leaf{
       scene,    params,     walk.ray,           ray.direction,
       ray.tmin, child_test, world_leaf.opacity, TraceStatus::ok};
   const TraceStatus top = traverse(scene.top, walk, child_test, leaf);
-  *transmittance = TransmittanceLeaf::transmittance_of(leaf.opacity);
+  *transmittance = transmittance_of(leaf.opacity);
   return leaf.status != TraceStatus::ok ? leaf.status : top;
 }
 

@@ -47,16 +47,42 @@ struct ClosestLeaf {
 // Shadow rays: anything opaque blocks, from either side, for a wall that cannot be seen from behind
 // still casts a shadow; BLEND surfaces let 1 - alpha through. The dimming is summed as
 // an integer logarithm, because integer sums do not depend on the order of visits.
+inline constexpr float kOpacityOne = 65536.0f;               // -log2(transmittance) * kOpacityOne
+inline constexpr std::uint32_t kOpacityBlocked = 24u << 16;  // 2^-24 is dark enough
+
+struct SurfaceName {
+  std::uint32_t triangle, flags, geometry;
+};
+
+// What the surface at a hit adds to `opacity`. True: nothing comes through any more.
+OCTRACE_HD OCTRACE_FORCE_INLINE bool dim(const SceneView& scene, const RenderParams& params,
+                                         const SurfaceName& surface, const TriangleHit& found,
+                                         std::uint32_t* opacity) {
+  if (params.alpha != 0 && (surface.flags & kAlphaTest) != 0 &&
+      !alpha_passes(scene, surface.geometry, surface.triangle, found.u, found.v)) {
+    return false;
+  }
+  if (params.alpha != 0 && (surface.flags & kBlend) != 0) {
+    const float alpha = surface_alpha(scene, surface.geometry, surface.triangle, found.u, found.v);
+    const float clear = lesser(greater(1.0f - alpha, 1.0f / (1 << 25)), 1.0f);
+    *opacity += static_cast<std::uint32_t>(-log2f(clear) * kOpacityOne);
+    return *opacity >= kOpacityBlocked;
+  }
+  *opacity = kOpacityBlocked;
+  return true;
+}
+
+OCTRACE_HD OCTRACE_FORCE_INLINE float transmittance_of(std::uint32_t opacity) {
+  return opacity >= kOpacityBlocked ? 0.0f : exp2f(-static_cast<float>(opacity) / kOpacityOne);
+}
+
 struct TransmittanceLeaf {
   const SceneView& scene;
   const RenderParams& params;
   const SlabRay& slab_ray;
   TriangleRay triangle_ray;
   float tmin;
-  std::uint32_t opacity;  // -log2(transmittance) * kOne
-
-  static constexpr float kOne = 65536.0f;
-  static constexpr std::uint32_t kBlocked = 24u << 16;  // 2^-24 is dark enough
+  std::uint32_t opacity;
 
   OCTRACE_HD OCTRACE_FORCE_INLINE bool operator()(std::uint32_t index, float& tmax) {
     const LeafTriangle triangle = load(scene.octree.triangles[index]);
@@ -65,32 +91,8 @@ struct TransmittanceLeaf {
                             false, &found)) {
       return false;
     }
-    return add_surface(scene, params, triangle, found, opacity);
-  }
-
-  // Adds what a surface that was hit takes of the light; true where nothing is left.
-  OCTRACE_HD OCTRACE_FORCE_INLINE static bool add_surface(const SceneView& scene,
-                                                          const RenderParams& params,
-                                                          const LeafTriangle& triangle,
-                                                          const TriangleHit& found,
-                                                          std::uint32_t& opacity) {
-    if (params.alpha != 0 && (triangle.flags & kAlphaTest) != 0 &&
-        !alpha_passes(scene, triangle.geometry, triangle.triangle, found.u, found.v)) {
-      return false;
-    }
-    if (params.alpha != 0 && (triangle.flags & kBlend) != 0) {
-      const float alpha =
-          surface_alpha(scene, triangle.geometry, triangle.triangle, found.u, found.v);
-      const float clear = lesser(greater(1.0f - alpha, 1.0f / (1 << 25)), 1.0f);
-      opacity += static_cast<std::uint32_t>(-log2f(clear) * kOne);
-      return opacity >= kBlocked;
-    }
-    opacity = kBlocked;
-    return true;
-  }
-
-  OCTRACE_HD static float transmittance_of(std::uint32_t opacity) {
-    return opacity >= kBlocked ? 0.0f : exp2f(-static_cast<float>(opacity) / kOne);
+    return dim(scene, params, {triangle.triangle, triangle.flags, triangle.geometry}, found,
+               &opacity);
   }
 };
 
@@ -129,7 +131,7 @@ OCTRACE_HD OCTRACE_FORCE_INLINE TraceStatus shadow_transmittance(const SceneView
   Walk walk(scene.octree, ray);
   TransmittanceLeaf leaf = transmittance_leaf(scene, params, walk, ray);
   const TraceStatus status = traverse(scene.octree, walk, child_test, leaf);
-  *transmittance = TransmittanceLeaf::transmittance_of(leaf.opacity);
+  *transmittance = transmittance_of(leaf.opacity);
   return status;
 }
 

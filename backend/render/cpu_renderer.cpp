@@ -1,9 +1,12 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
 #include <fstream>
 #include <mutex>
+#include <vector>
 
+#include "backend/octree/wide.h"
 #include "backend/render/renderer.h"
 #include "backend/render/tiles.h"
 #include "kernels/cpu/intersect.h"
@@ -49,32 +52,93 @@ struct TileCounts {
   kernels::RayCounts beauty;
 };
 
-template <class Scene>
-TraceStatus trace_pixel(const View& view, const Scene& scene, const kernels::CpuTracer& tracer,
-                        std::uint32_t x, std::uint32_t y, TileCounts* counts) {
-  if (view.geometry) {
-    ++counts->camera;
-    const TraceStatus status =
-        view.motion == nullptr
-            ? trace_geometry(scene, view.camera, view.params, view.target, x, y, tracer)
-            : trace_geometry(scene, view.camera, view.params, view.target, x, y, tracer,
-                             kernels::MotionPlane{*view.motion});
-    if (status != TraceStatus::ok) return status;
+// What a packet of rays found, in the place of a tracer.
+struct Found {
+  kernels::Hit hit;
+  TraceStatus closest(const kernels::SceneView&, const kernels::RenderParams&, const kernels::Ray&,
+                      kernels::Hit* to) const {
+    *to = hit;
+    return TraceStatus::ok;
   }
-  if (!view.beauty) return TraceStatus::ok;
-  return trace_beauty(scene, view.camera, view.params, view.target, x, y, tracer, &counts->beauty);
+};
+
+template <class Scene, class Tracer>
+TraceStatus geometry_pixel(const View& view, const Scene& scene, const Tracer& tracer,
+                           std::uint32_t x, std::uint32_t y) {
+  return view.motion == nullptr
+             ? trace_geometry(scene, view.camera, view.params, view.target, x, y, tracer)
+             : trace_geometry(scene, view.camera, view.params, view.target, x, y, tracer,
+                              kernels::MotionPlane{*view.motion});
 }
 
-template <class Scene>
-TileFailure trace_tile(const View& view, const Scene& scene, const kernels::CpuTracer& tracer,
-                       const Tile& tile, TileCounts* counts) {
-  for (std::uint32_t y = tile.y0; y < tile.y1; ++y) {
-    for (std::uint32_t x = tile.x0; x < tile.x1; ++x) {
-      const TraceStatus status = trace_pixel(view, scene, tracer, x, y, counts);
-      if (status != TraceStatus::ok) return {status, x, y};
+// Calls visit(x, y) for the pixels of the tile, in blocks of 4x4, until it fails.
+template <class Visit>
+TileFailure visit_pixels(const Tile& tile, const Visit& visit) {
+  constexpr std::uint32_t kBlock = 4;
+  for (std::uint32_t y0 = tile.y0; y0 < tile.y1; y0 += kBlock) {
+    for (std::uint32_t x0 = tile.x0; x0 < tile.x1; x0 += kBlock) {
+      for (std::uint32_t y = y0; y < std::min(y0 + kBlock, tile.y1); ++y) {
+        for (std::uint32_t x = x0; x < std::min(x0 + kBlock, tile.x1); ++x) {
+          const TraceStatus status = visit(x, y);
+          if (status != TraceStatus::ok) return {status, x, y};
+        }
+      }
     }
   }
   return {};
+}
+
+// The rays of a tile are traced together, because neighbours meet the same nodes.
+TileFailure trace_geometry_tile(const View& view, const kernels::SceneView& scene,
+                                const kernels::CpuTracer& tracer, const Tile& tile) {
+  std::vector<kernels::Ray> rays;
+  rays.reserve(static_cast<std::size_t>(tile.x1 - tile.x0) * (tile.y1 - tile.y0));
+  visit_pixels(tile, [&](std::uint32_t x, std::uint32_t y) {
+    rays.push_back(
+        camera_ray(view.camera, static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f));
+    return TraceStatus::ok;
+  });
+  std::vector<kernels::Hit> hits(rays.size());
+  const TraceStatus status = tracer.closest_coherent(
+      scene, view.params, rays.data(), static_cast<std::uint32_t>(rays.size()), hits.data());
+  if (status != TraceStatus::ok) {  // one by one, to say which pixel it is
+    return visit_pixels(tile, [&](std::uint32_t x, std::uint32_t y) {
+      return geometry_pixel(view, scene, tracer, x, y);
+    });
+  }
+  std::size_t next = 0;
+  return visit_pixels(tile, [&](std::uint32_t x, std::uint32_t y) {
+    return geometry_pixel(view, scene, Found{hits[next++]}, x, y);
+  });
+}
+
+TileFailure trace_tile(const View& view, const kernels::SceneView& scene,
+                       const kernels::CpuTracer& tracer, const Tile& tile, TileCounts* counts) {
+  if (view.geometry) {
+    const TileFailure failure = trace_geometry_tile(view, scene, tracer, tile);
+    if (failure.status != TraceStatus::ok) return failure;
+    counts->camera += std::uint64_t{tile.x1 - tile.x0} * (tile.y1 - tile.y0);
+  }
+  if (!view.beauty) return {};
+  return visit_pixels(tile, [&](std::uint32_t x, std::uint32_t y) {
+    return trace_beauty(scene, view.camera, view.params, view.target, x, y, tracer,
+                        &counts->beauty);
+  });
+}
+
+// A scene with instances: each ray for itself.
+TileFailure trace_tile(const View& view, const kernels::InstancedSceneView& scene,
+                       const kernels::CpuTracer& tracer, const Tile& tile, TileCounts* counts) {
+  return visit_pixels(tile, [&](std::uint32_t x, std::uint32_t y) {
+    if (view.geometry) {
+      ++counts->camera;
+      const TraceStatus status = geometry_pixel(view, scene, tracer, x, y);
+      if (status != TraceStatus::ok) return status;
+    }
+    if (!view.beauty) return TraceStatus::ok;
+    return trace_beauty(scene, view.camera, view.params, view.target, x, y, tracer,
+                        &counts->beauty);
+  });
 }
 
 class CpuRenderer final : public Renderer {
@@ -92,11 +156,19 @@ class CpuRenderer final : public Renderer {
   }
 
  private:
-  void look() { scene_ = octree::instanced_view(source_, octree_); }
+  void look() {
+    scene_ = octree::instanced_view(source_, octree_);
+    // Only scenes without instances are walked by their wide nodes.
+    wide_ = kernels::CpuTracer::uses_wide() && scene_.top.nodes.empty()
+                ? octree::make_wide(scene_.octree)
+                : octree::WideOctree{};
+    tracer_ = kernels::CpuTracer(wide_.view());
+  }
 
   const scene::Scene& source_;
   const octree::Octree& octree_;
   kernels::InstancedSceneView scene_;
+  octree::WideOctree wide_;
   kernels::CpuTracer tracer_;
 };
 

@@ -5,6 +5,15 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
+#undef OCTRACE_WIDE
+#if HWY_MAX_BYTES >= 32 && HWY_TARGET != HWY_SCALAR && HWY_TARGET != HWY_EMU128
+#define OCTRACE_WIDE 1
+#include "kernels/cpu/packet-inl.h"
+#include "kernels/cpu/stream-inl.h"
+#else
+#define OCTRACE_WIDE 0
+#endif
+
 HWY_BEFORE_NAMESPACE();
 namespace octrace::kernels::HWY_NAMESPACE {
 
@@ -100,13 +109,51 @@ struct SimdChildTest {
 #endif
 };
 
-HWY_ATTR TraceStatus closest(const SceneView& scene, const RenderParams& params, const Ray& ray,
-                             Hit* hit) {
+#if OCTRACE_WIDE
+// One ray at a time, where the next one depends on it.
+template <class Query>
+HWY_ATTR HWY_INLINE void trace_one(const WideView& tree, const SceneView& scene,
+                                   const RenderParams& params, const Ray& from, WideRay& ray) {
+  begin(tree, from, 0, ray);
+  while (ray.ref != kDoneRef) {
+    if ((ray.ref & kLeafRef) == 0) {
+      visit_node(tree, ray);
+    } else if (visit_leaf<Query>(tree, scene, params, ray)) {
+      return;
+    }
+    pop(ray);
+  }
+}
+#endif
+
+HWY_ATTR TraceStatus closest(const WideView& tree, const SceneView& scene,
+                             const RenderParams& params, const Ray& ray, Hit* hit) {
+#if OCTRACE_WIDE
+  if (!tree.empty()) {
+    WideRay walk;
+    trace_one<ClosestQuery>(tree, scene, params, ray, walk);
+    *hit = walk.hit;
+    return TraceStatus::ok;
+  }
+#else
+  (void)tree;
+#endif
   return closest_hit(scene, params, ray, SimdChildTest{}, hit);
 }
 
-HWY_ATTR TraceStatus transmittance(const SceneView& scene, const RenderParams& params,
-                                   const Ray& ray, float* transmittance) {
+HWY_ATTR TraceStatus transmittance(const WideView& tree, const SceneView& scene,
+                                   const RenderParams& params, const Ray& ray,
+                                   float* transmittance) {
+#if OCTRACE_WIDE
+  if (!tree.empty()) {
+    WideRay walk;
+    trace_one<TransmittanceQuery>(tree, scene, params, ray, walk);
+    *transmittance = transmittance_of(walk.opacity);
+    return TraceStatus::ok;
+  }
+#else
+  (void)tree;
+#endif
   return shadow_transmittance(scene, params, ray, SimdChildTest{}, transmittance);
 }
 
@@ -120,6 +167,71 @@ HWY_ATTR TraceStatus instanced_transmittance(const InstancedSceneView& scene,
                                              float* transmittance) {
   return shadow_transmittance(scene, params, ray, SimdChildTest{}, transmittance);
 }
+
+HWY_ATTR TraceStatus closest_stream(const WideView& tree, const SceneView& scene,
+                                    const RenderParams& params, const Ray* rays,
+                                    std::uint32_t count, Hit* hits) {
+#if OCTRACE_WIDE
+  if (!tree.empty()) {
+    trace_stream<ClosestQuery>(tree, scene, params, rays, count,
+                               [&](std::uint32_t i, const WideRay& walk)
+                                   HWY_ATTR { hits[i] = walk.hit; });
+    return TraceStatus::ok;
+  }
+#endif
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const TraceStatus status = closest(tree, scene, params, rays[i], &hits[i]);
+    if (status != TraceStatus::ok) return status;
+  }
+  return TraceStatus::ok;
+}
+
+inline constexpr std::uint32_t kMostStreamed = 1024;
+
+HWY_ATTR TraceStatus closest_packets(const WideView& tree, const SceneView& scene,
+                                     const RenderParams& params, const Ray* rays,
+                                     std::uint32_t count, Hit* hits) {
+#if OCTRACE_WIDE
+  if (!tree.empty()) {
+    Packet packet;
+    // Where packets fail, more and more rays go into streams before the next one is tried.
+    std::uint32_t streamed = kPacketRays;
+    for (std::uint32_t first = 0, size; first < count; first += size) {
+      size = count - first < kPacketRays ? count - first : kPacketRays;
+      if (trace_packet(tree, scene, params, rays + first, size, packet, hits + first)) {
+        streamed = kPacketRays;
+        continue;
+      }
+      streamed = streamed < kMostStreamed ? 4 * streamed : streamed;
+      size = count - first < streamed ? count - first : streamed;
+      closest_stream(tree, scene, params, rays + first, size, hits + first);
+    }
+    return TraceStatus::ok;
+  }
+#endif
+  return closest_stream(tree, scene, params, rays, count, hits);
+}
+
+HWY_ATTR TraceStatus transmittance_stream(const WideView& tree, const SceneView& scene,
+                                          const RenderParams& params, const Ray* rays,
+                                          std::uint32_t count, float* transmittances) {
+#if OCTRACE_WIDE
+  if (!tree.empty()) {
+    trace_stream<TransmittanceQuery>(tree, scene, params, rays, count,
+                                     [&](std::uint32_t i, const WideRay& walk) HWY_ATTR {
+                                       transmittances[i] = transmittance_of(walk.opacity);
+                                     });
+    return TraceStatus::ok;
+  }
+#endif
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const TraceStatus status = transmittance(tree, scene, params, rays[i], &transmittances[i]);
+    if (status != TraceStatus::ok) return status;
+  }
+  return TraceStatus::ok;
+}
+
+HWY_ATTR bool uses_wide() { return OCTRACE_WIDE; }
 
 // Highway counts AVX-512 as the third AVX.
 HWY_ATTR const char* instruction_set() {
@@ -137,17 +249,34 @@ HWY_EXPORT(closest);
 HWY_EXPORT(transmittance);
 HWY_EXPORT(instanced_closest);
 HWY_EXPORT(instanced_transmittance);
+HWY_EXPORT(closest_stream);
+HWY_EXPORT(closest_packets);
+HWY_EXPORT(transmittance_stream);
+HWY_EXPORT(uses_wide);
 HWY_EXPORT(instruction_set);
 
-CpuTracer::CpuTracer() {
+namespace {
+
+std::size_t target_index() {
   hwy::GetChosenTarget().Update(hwy::SupportedTargets());
-  const auto index = hwy::GetChosenTarget().GetIndex();
+  return hwy::GetChosenTarget().GetIndex();
+}
+
+}  // namespace
+
+CpuTracer::CpuTracer(const WideView& wide) : wide_(wide) {
+  const std::size_t index = target_index();
   closest_ = HWY_DISPATCH_TABLE(closest)[index];
   transmittance_ = HWY_DISPATCH_TABLE(transmittance)[index];
   instanced_closest_ = HWY_DISPATCH_TABLE(instanced_closest)[index];
   instanced_transmittance_ = HWY_DISPATCH_TABLE(instanced_transmittance)[index];
+  closest_packets_ = HWY_DISPATCH_TABLE(closest_packets)[index];
+  closest_stream_ = HWY_DISPATCH_TABLE(closest_stream)[index];
+  transmittance_stream_ = HWY_DISPATCH_TABLE(transmittance_stream)[index];
   instruction_set_ = HWY_DISPATCH_TABLE(instruction_set)[index]();
 }
+
+bool CpuTracer::uses_wide() { return HWY_DISPATCH_TABLE(uses_wide)[target_index()](); }
 
 }  // namespace octrace::kernels
 #endif

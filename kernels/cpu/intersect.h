@@ -2,6 +2,7 @@
 // is chosen at run time. All of them return the same bits.
 #pragma once
 
+#include "kernels/cpu/wide_node.h"
 #include "kernels/instance_intersect.h"
 #include "kernels/intersect.h"
 
@@ -9,14 +10,33 @@ namespace octrace::kernels {
 
 class CpuTracer {
  public:
-  CpuTracer();
+  // With wide nodes made from the octree of every scene that it is asked about, or without. It
+  // keeps to the octree's own nodes where the machine's instruction set has no vectors of eight
+  // floats.
+  explicit CpuTracer(const WideView& wide = {});
+  static bool uses_wide();
+
   TraceStatus closest(const SceneView& scene, const RenderParams& params, const Ray& ray,
                       Hit* hit) const {
-    return closest_(scene, params, ray, hit);
+    return closest_(wide_, scene, params, ray, hit);
   }
   TraceStatus transmittance(const SceneView& scene, const RenderParams& params, const Ray& ray,
                             float* transmittance) const {
-    return transmittance_(scene, params, ray, transmittance);
+    return transmittance_(wide_, scene, params, ray, transmittance);
+  }
+  // The same for many rays that need not lie together: faster than one by one.
+  TraceStatus closest(const SceneView& scene, const RenderParams& params, const Ray* rays,
+                      std::uint32_t count, Hit* hits) const {
+    return closest_stream_(wide_, scene, params, rays, count, hits);
+  }
+  TraceStatus transmittance(const SceneView& scene, const RenderParams& params, const Ray* rays,
+                            std::uint32_t count, float* transmittances) const {
+    return transmittance_stream_(wide_, scene, params, rays, count, transmittances);
+  }
+  // The same for rays of which every sixteen in a row lie close together, as a camera's do.
+  TraceStatus closest_coherent(const SceneView& scene, const RenderParams& params, const Ray* rays,
+                               std::uint32_t count, Hit* hits) const {
+    return closest_packets_(wide_, scene, params, rays, count, hits);
   }
   TraceStatus closest(const InstancedSceneView& scene, const RenderParams& params, const Ray& ray,
                       InstancedHit* hit) const {
@@ -29,8 +49,17 @@ class CpuTracer {
   const char* instruction_set() const { return instruction_set_; }  // "AVX2"
 
  private:
-  TraceStatus (*closest_)(const SceneView&, const RenderParams&, const Ray&, Hit*);
-  TraceStatus (*transmittance_)(const SceneView&, const RenderParams&, const Ray&, float*);
+  template <class Result>
+  using One = TraceStatus (*)(const WideView&, const SceneView&, const RenderParams&, const Ray&,
+                              Result*);
+  template <class Result>
+  using Many = TraceStatus (*)(const WideView&, const SceneView&, const RenderParams&, const Ray*,
+                               std::uint32_t, Result*);
+  WideView wide_;
+  One<Hit> closest_;
+  One<float> transmittance_;
+  Many<Hit> closest_stream_, closest_packets_;
+  Many<float> transmittance_stream_;
   TraceStatus (*instanced_closest_)(const InstancedSceneView&, const RenderParams&, const Ray&,
                                     InstancedHit*);
   TraceStatus (*instanced_transmittance_)(const InstancedSceneView&, const RenderParams&,

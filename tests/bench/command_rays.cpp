@@ -51,7 +51,8 @@ class SceneBench {
       : options_(options),
         name_(std::move(name)),
         scene_(std::move(scene)),
-        octree_(std::move(octree)) {
+        octree_(std::move(octree)),
+        wide_(octree::make_wide(octree_.view())) {
     if (options.peer == "embree") {
       peer_.emplace(scene_, EmbreePeer::Quality::high, options.threads);
     }
@@ -67,7 +68,7 @@ class SceneBench {
   bool run(const kernels::RayCamera& camera, int width, int height, nlohmann::json& rows) {
     const std::vector<kernels::Ray> primary = primary_rays(camera, width, height);
     std::vector<kernels::Hit> hits;
-    trace_cpu(scene_, octree_, primary, false, options_.threads, &hits);
+    trace_cpu(scene_, octree_, wide_, primary, false, true, options_.threads, &hits);
     for (const RaySet set : {RaySet::primary, RaySet::bounce, RaySet::ao}) {
       if (std::find(options_.sets.begin(), options_.sets.end(), bench::name_of(set)) ==
           options_.sets.end())
@@ -87,8 +88,9 @@ class SceneBench {
 
  private:
   bool run_set(const Rays& rays, nlohmann::json& rows) {
+    const bool coherent = rays.set == RaySet::primary;
     std::vector<kernels::Hit> ours;
-    trace_cpu(scene_, octree_, rays.rays, rays.any_hit, options_.threads, &ours);  // warms up, too
+    trace_cpu(scene_, octree_, wide_, rays.rays, rays.any_hit, coherent, options_.threads, &ours);
     std::vector<EmbreePeer::Interface> interfaces;
     if (peer_) {
       interfaces = {EmbreePeer::Interface::single, EmbreePeer::Interface::packet,
@@ -106,7 +108,8 @@ class SceneBench {
     std::vector<double> own;
     std::vector<std::vector<double>> peers(interfaces.size());
     for (int i = 0; i < options_.repeats; ++i) {  // turn about, so that both see the same machine
-      own.push_back(trace_cpu(scene_, octree_, rays.rays, rays.any_hit, options_.threads, nullptr));
+      own.push_back(trace_cpu(scene_, octree_, wide_, rays.rays, rays.any_hit, coherent,
+                              options_.threads, nullptr));
       for (std::size_t k = 0; k < interfaces.size(); ++k) {
         peers[k].push_back(
             peer_->trace(rays.rays, rays.any_hit, interfaces[k], options_.threads, nullptr));
@@ -119,7 +122,7 @@ class SceneBench {
   // False where a hit differs from the CPU's.
   util::Result<bool> run_set_on_gpu(const Rays& rays, nlohmann::json& rows) {
     std::vector<kernels::Hit> expected;
-    trace_cpu(scene_, octree_, rays.rays, rays.any_hit, options_.threads, &expected);
+    trace_cpu(scene_, octree_, wide_, rays.rays, rays.any_hit, false, options_.threads, &expected);
     if (util::Result<void> loaded = gpu_->load(rays.rays); !loaded) return loaded.error();
     const util::Result<std::vector<kernels::Hit>> found = gpu_->trace(rays.any_hit);
     if (!found) return found.error();
@@ -207,6 +210,7 @@ class SceneBench {
   std::string name_;
   scene::Scene scene_;
   octree::Octree octree_;
+  octree::WideOctree wide_;
   std::optional<EmbreePeer> peer_;
   std::unique_ptr<RayGpu> gpu_;
 };

@@ -9,6 +9,8 @@
 #include <cstring>
 #include <string>
 
+#include "tests/bench/clock.h"
+
 namespace octrace::bench {
 
 namespace {
@@ -148,14 +150,14 @@ double EmbreePeer::trace(const std::vector<kernels::Ray>& rays, bool any_hit, In
   converted.reserve(rays.size());
   for (const kernels::Ray& ray : rays) converted.push_back(to_embree(ray));
   const bool coherent = interface != Interface::single;
-  const auto start = std::chrono::steady_clock::now();
+  const double start = seconds_now(threads);
   tbb::task_arena(static_cast<int>(threads)).execute([&] {
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, rays.size(), kGrain),
                       [&](const tbb::blocked_range<std::size_t>& r) {
                         impl_->trace(converted, r.begin(), r.end(), any_hit, interface, coherent);
                       });
   });
-  const double seconds = seconds_since(start);
+  const double seconds = seconds_now(threads) - start;
   if (hits != nullptr) {
     hits->resize(rays.size());
     for (std::size_t i = 0; i < rays.size(); ++i) {

@@ -4,9 +4,8 @@
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
-#include <chrono>
-
 #include "kernels/cpu/intersect.h"
+#include "tests/bench/clock.h"
 
 namespace octrace::bench {
 
@@ -50,33 +49,39 @@ Work count_work(const scene::Scene& scene, const octree::Octree& octree,
 }
 
 double trace_cpu(const scene::Scene& scene, const octree::Octree& octree,
-                 const std::vector<kernels::Ray>& rays, bool any_hit, unsigned threads,
-                 std::vector<kernels::Hit>* hits) {
+                 const octree::WideOctree& wide, const std::vector<kernels::Ray>& rays,
+                 bool any_hit, bool coherent, unsigned threads, std::vector<kernels::Hit>* hits) {
   kernels::SceneView view = scene.view();
   view.octree = octree.view();
   kernels::RenderParams params;
   params.cull = 0;
   params.alpha = 0;
-  const kernels::CpuTracer tracer;
-  std::vector<kernels::Hit> found(rays.size());
+  const kernels::CpuTracer tracer(wide.view());
+  std::vector<kernels::Hit> found(any_hit ? 0 : rays.size());
+  std::vector<float> transmittances(any_hit ? rays.size() : 0);
   constexpr std::size_t kGrain = 4096;
-  const auto start = std::chrono::steady_clock::now();
+  const double start = seconds_now(threads);
   tbb::task_arena(static_cast<int>(threads)).execute([&] {
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, rays.size(), kGrain),
                       [&](const tbb::blocked_range<std::size_t>& range) {
-                        for (std::size_t i = range.begin(); i < range.end(); ++i) {
-                          if (any_hit) {
-                            float transmittance = 1.0f;
-                            tracer.transmittance(view, params, rays[i], &transmittance);
-                            found[i].triangle = transmittance > 0.0f ? kernels::kNone : 0;
-                          } else {
-                            tracer.closest(view, params, rays[i], &found[i]);
-                          }
+                        const std::size_t first = range.begin();
+                        const auto count = static_cast<std::uint32_t>(range.size());
+                        if (any_hit) {
+                          tracer.transmittance(view, params, &rays[first], count,
+                                               &transmittances[first]);
+                        } else if (coherent) {
+                          tracer.closest_coherent(view, params, &rays[first], count, &found[first]);
+                        } else {
+                          tracer.closest(view, params, &rays[first], count, &found[first]);
                         }
                       });
   });
-  const double seconds =
-      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  const double seconds = seconds_now(threads) - start;
+  if (any_hit && hits != nullptr) {
+    found.resize(rays.size());
+    for (std::size_t i = 0; i < rays.size(); ++i)
+      found[i].triangle = transmittances[i] > 0.0f ? kernels::kNone : 0;
+  }
   if (hits != nullptr) *hits = std::move(found);
   return seconds;
 }

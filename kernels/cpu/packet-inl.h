@@ -1,0 +1,352 @@
+// Rays that lie close together, such as a camera's: one walk for all of them, over the nodes that
+// the beam around them meets, and leaf triangles tested a ray a lane. Included once for each
+// instruction set.
+#if defined(OCTRACE_PACKET_INL) == defined(HWY_TARGET_TOGGLE)
+#ifdef OCTRACE_PACKET_INL
+#undef OCTRACE_PACKET_INL
+#else
+#define OCTRACE_PACKET_INL
+#endif
+
+#include "kernels/cpu/wide_walk-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace octrace::kernels::HWY_NAMESPACE {
+
+inline constexpr std::uint32_t kPacketVectors = 2;
+inline constexpr std::uint32_t kPacketRays = 8 * kPacketVectors;
+
+// A packet that needs more steps than this, of a node or half a triangle each, is not coherent
+// enough: its rays cost less in a stream.
+inline constexpr std::uint32_t kPacketSteps = 128;
+
+struct alignas(64) Packet {
+  float origin[3][kPacketRays], direction[3][kPacketRays], inverse[3][kPacketRays];
+  float row[3][3][kPacketRays];  // of the shear: row_x, row_y, row_z by axis
+  float tmin[kPacketRays], tmax[kPacketRays];
+  float t[kPacketRays], u[kPacketRays], v[kPacketRays];
+  std::uint32_t triangle[kPacketRays];
+  // The beam: bounds over the rays. Planes that are entered are seen from the origin that makes
+  // the distance least, planes that are left from the one that makes it most.
+  float enter_origin[3], leave_origin[3], least[3], most[3], slope[3];
+  float beam_tmin, beam_tmax;
+  std::uint32_t octant, enter[3];
+  alignas(32) float stack_t[kWideStack];
+  alignas(32) WideRef stack_ref[kWideStack];
+
+  SlabRay slab_ray(std::uint32_t i) const {
+    return {Vec3(origin[0][i], origin[1][i], origin[2][i]), octant,
+            Vec3(inverse[0][i], inverse[1][i], inverse[2][i])};
+  }
+  TriangleRay triangle_ray(std::uint32_t i) const {
+    return {Vec3(row[0][0][i], row[0][1][i], row[0][2][i]),
+            Vec3(row[1][0][i], row[1][1][i], row[1][2][i]),
+            Vec3(row[2][0][i], row[2][1][i], row[2][2][i])};
+  }
+};
+
+// make_slab_ray() and make_triangle_ray(), a ray a lane.
+HWY_ATTR HWY_INLINE void prepare(Packet& p, std::uint32_t first) {
+  const Floats d;
+  using V = hn::Vec<Floats>;
+  const V zero = hn::Zero(d), one = hn::Set(d, 1.0f);
+  V dir[3], inv[3];
+  for (int axis = 0; axis < 3; ++axis) {
+    const V x = dir[axis] = hn::Load(d, &p.direction[axis][first]);
+    const V tiny = hn::Set(d, kTinyDirection);
+    const V kept = hn::IfThenElse(hn::Lt(hn::Abs(x), tiny),
+                                  hn::IfThenElse(hn::Lt(x, zero), hn::Neg(tiny), tiny), x);
+    inv[axis] = hn::Div(one, kept);
+    hn::Store(inv[axis], d, &p.inverse[axis][first]);
+  }
+  const V ax = hn::Abs(dir[0]), ay = hn::Abs(dir[1]), az = hn::Abs(dir[2]);
+  const auto z = hn::And(hn::Ge(az, ax), hn::Ge(az, ay));
+  const auto y = hn::Ge(ay, ax);  // where not z
+  const auto pick = [&](V if_x, V if_y, V if_z)
+                        HWY_ATTR { return hn::IfThenElse(z, if_z, hn::IfThenElse(y, if_y, if_x)); };
+  const V dk = pick(dir[0], dir[1], dir[2]);
+  const V i = hn::Neg(hn::Div(pick(dir[1], dir[2], dir[0]), dk));  // row_x's scale
+  const V j = hn::Neg(hn::Div(pick(dir[2], dir[0], dir[1]), dk));  // row_y's
+  const V r = hn::Div(one, dk);
+  const V x_row[3] = {pick(i, zero, one), pick(one, i, zero), pick(zero, one, i)};
+  const V y_row[3] = {pick(j, one, zero), pick(zero, j, one), pick(one, zero, j)};
+  const V z_row[3] = {pick(r, zero, zero), pick(zero, r, zero), pick(zero, zero, r)};
+  const auto negative = hn::Lt(dk, zero);
+  for (int axis = 0; axis < 3; ++axis) {
+    hn::Store(hn::IfThenElse(negative, y_row[axis], x_row[axis]), d, &p.row[0][axis][first]);
+    hn::Store(hn::IfThenElse(negative, x_row[axis], y_row[axis]), d, &p.row[1][axis][first]);
+    hn::Store(z_row[axis], d, &p.row[2][axis][first]);
+  }
+}
+
+// False: the rays' directions have different signs, so that no order of visits suits them all.
+HWY_ATTR HWY_INLINE bool begin(const Ray* rays, std::uint32_t count, Packet& p) {
+  std::uint32_t all = 7, any = 0;
+  for (std::uint32_t i = 0; i < kPacketRays; ++i) {
+    const Ray& ray = rays[i < count ? i : count - 1];
+    std::uint32_t octant = 0;
+    for (int axis = 0; axis < 3; ++axis) {
+      p.origin[axis][i] = ray.origin[axis];
+      p.direction[axis][i] = ray.direction[axis];
+      octant |= (ray.direction[axis] < 0.0f ? 1u : 0u) << axis;
+    }
+    p.tmin[i] = ray.tmin;
+    p.tmax[i] = p.t[i] = ray.tmax;
+    p.u[i] = p.v[i] = 0.0f;
+    p.triangle[i] = kNone;
+    all &= octant;
+    any |= octant;
+  }
+  if (all != any) return false;
+  p.octant = all;
+  const Floats d;
+  for (std::uint32_t first = 0; first < kPacketRays; first += 8) prepare(p, first);
+  const auto least = [&](const float* from) HWY_ATTR {
+    auto v = hn::Load(d, from);
+    for (std::uint32_t i = 8; i < kPacketRays; i += 8) v = hn::Min(v, hn::Load(d, from + i));
+    return hn::GetLane(hn::MinOfLanes(d, v));
+  };
+  const auto most = [&](const float* from) HWY_ATTR {
+    auto v = hn::Load(d, from);
+    for (std::uint32_t i = 8; i < kPacketRays; i += 8) v = hn::Max(v, hn::Load(d, from + i));
+    return hn::GetLane(hn::MaxOfLanes(d, v));
+  };
+  for (int axis = 0; axis < 3; ++axis) {
+    const bool negative = (all >> axis) & 1;
+    const float lower = least(p.origin[axis]), upper = most(p.origin[axis]);
+    p.enter_origin[axis] = negative ? lower : upper;
+    p.leave_origin[axis] = negative ? upper : lower;
+    p.least[axis] = least(p.inverse[axis]);
+    p.most[axis] = most(p.inverse[axis]);
+    p.slope[axis] = negative ? -p.least[axis] : p.most[axis];
+    p.enter[axis] = static_cast<std::uint32_t>(axis) * 64 + (negative ? 32 : 0);
+  }
+  p.beam_tmin = least(p.tmin);
+  p.beam_tmax = most(p.tmax);
+  return true;
+}
+
+// Which of eight boxes the beam meets, and where it enters them. Padded by 2^-19 times the farthest
+// plane's distance: see wide_node.h.
+template <class Vectors>
+HWY_ATTR HWY_INLINE auto meet(const Packet& p, const Vectors& enter, const Vectors& leave,
+                              float tmin, hn::Vec<Floats>* near_out) {
+  const Floats d;
+  using V = hn::Vec<Floats>;
+  V in[3], out[3];
+  V farthest = hn::Zero(d);
+  for (int axis = 0; axis < 3; ++axis) {
+    in[axis] = hn::Sub(enter[axis], hn::Set(d, p.enter_origin[axis]));
+    out[axis] = hn::Sub(leave[axis], hn::Set(d, p.leave_origin[axis]));
+    farthest = hn::Max(farthest, hn::Max(hn::Abs(in[axis]), hn::Abs(out[axis])));
+  }
+  const V padding = hn::Mul(farthest, hn::Set(d, kChildPadding));
+  V near = hn::Set(d, tmin), far = hn::Set(d, p.beam_tmax);
+  for (int axis = 0; axis < 3; ++axis) {
+    const V least = hn::Set(d, p.least[axis]), most = hn::Set(d, p.most[axis]);
+    const V widen = hn::Mul(padding, hn::Set(d, p.slope[axis]));
+    near =
+        hn::Max(near, hn::Sub(hn::Min(hn::Mul(in[axis], least), hn::Mul(in[axis], most)), widen));
+    far =
+        hn::Min(far, hn::Add(hn::Max(hn::Mul(out[axis], least), hn::Mul(out[axis], most)), widen));
+  }
+  *near_out = near;
+  return hn::Le(near, far);
+}
+
+// intersect_triangle() for one triangle and eight rays from `first` on.
+HWY_ATTR HWY_INLINE bool test(const SceneView& scene, const RenderParams& params, Packet& p,
+                              std::uint32_t first, const float* rows, std::uint32_t n,
+                              std::uint32_t place) {
+  const Floats d;
+  const Words du;
+  using V = hn::Vec<Floats>;
+  const auto corner = [&](std::uint32_t r) HWY_ATTR { return hn::Set(d, rows[r * n + place]); };
+  const auto of_ray = [&](const float* from) HWY_ATTR { return hn::Load(d, from + first); };
+  const V ox = of_ray(p.origin[0]), oy = of_ray(p.origin[1]), oz = of_ray(p.origin[2]);
+  const V x_a = hn::Sub(corner(0), ox), y_a = hn::Sub(corner(1), oy), z_a = hn::Sub(corner(2), oz);
+  const V x_b = hn::Sub(corner(3), ox), y_b = hn::Sub(corner(4), oy), z_b = hn::Sub(corner(5), oz);
+  const V x_c = hn::Sub(corner(6), ox), y_c = hn::Sub(corner(7), oy), z_c = hn::Sub(corner(8), oz);
+  const auto shear8 = [&](int row, V x, V y, V z) HWY_ATTR {
+    return hn::MulAdd(of_ray(p.row[row][0]), x,
+                      hn::MulAdd(of_ray(p.row[row][1]), y, hn::Mul(of_ray(p.row[row][2]), z)));
+  };
+  const auto edge8 = [&](V ax, V ay, V bx, V by)
+                         HWY_ATTR { return hn::Sub(hn::Mul(ax, by), hn::Mul(ay, bx)); };
+  const V ax = shear8(0, x_a, y_a, z_a), ay = shear8(1, x_a, y_a, z_a);
+  const V bx = shear8(0, x_b, y_b, z_b), by = shear8(1, x_b, y_b, z_b);
+  const V cx = shear8(0, x_c, y_c, z_c), cy = shear8(1, x_c, y_c, z_c);
+  const V wa = edge8(cx, cy, bx, by), wb = edge8(ax, ay, cx, cy), wc = edge8(bx, by, ax, ay);
+  const V zero = hn::Zero(d);
+  const V least = hn::Min(hn::Min(wa, wb), wc), most = hn::Max(hn::Max(wa, wb), wc);
+  const auto mixed = hn::And(hn::Lt(least, zero), hn::Gt(most, zero));
+  if (hn::AllTrue(d, mixed)) return false;
+
+  const V det = hn::Add(hn::Add(wa, wb), wc);
+  const V scaled =
+      hn::Add(hn::Add(hn::Mul(wa, shear8(2, x_a, y_a, z_a)), hn::Mul(wb, shear8(2, x_b, y_b, z_b))),
+              hn::Mul(wc, shear8(2, x_c, y_c, z_c)));
+  const V widest = hn::Max(hn::Max(hn::Abs(ax), hn::Abs(bx)), hn::Abs(cx));
+  const V highest = hn::Max(hn::Max(hn::Abs(ay), hn::Abs(by)), hn::Abs(cy));
+  const V thin = hn::Mul(hn::Mul(widest, highest), hn::Set(d, kThinTriangle));
+  const V lower[3] = {hn::Sub(hn::Min(hn::Min(corner(0), corner(3)), corner(6)), ox),
+                      hn::Sub(hn::Min(hn::Min(corner(1), corner(4)), corner(7)), oy),
+                      hn::Sub(hn::Min(hn::Min(corner(2), corner(5)), corner(8)), oz)};
+  const V upper[3] = {hn::Sub(hn::Max(hn::Max(corner(0), corner(3)), corner(6)), ox),
+                      hn::Sub(hn::Max(hn::Max(corner(1), corner(4)), corner(7)), oy),
+                      hn::Sub(hn::Max(hn::Max(corner(2), corner(5)), corner(8)), oz)};
+  const V mx = hn::Max(hn::Abs(lower[0]), hn::Abs(upper[0]));
+  const V my = hn::Max(hn::Abs(lower[1]), hn::Abs(upper[1]));
+  const V mz = hn::Max(hn::Abs(lower[2]), hn::Abs(upper[2]));
+  const V padding = hn::Mul(hn::Max(hn::Max(mx, my), mz), hn::Set(d, kBoxPadding));
+  V nears[3], fars[3];
+  for (int axis = 0; axis < 3; ++axis) {
+    const V i = of_ray(p.inverse[axis]);
+    const V a = hn::Mul(hn::Sub(lower[axis], padding), i);
+    const V b = hn::Mul(hn::Add(upper[axis], padding), i);
+    const bool negative = (p.octant >> axis) & 1;
+    nears[axis] = negative ? b : a;
+    fars[axis] = negative ? a : b;
+  }
+  const V near = hn::Max(hn::Max(nears[0], nears[1]), nears[2]);
+  const V far = hn::Min(hn::Min(fars[0], fars[1]), fars[2]);
+  const V t = hn::Min(hn::Max(hn::Div(scaled, det), near), far);
+
+  const auto word = [&](std::uint32_t r) {
+    std::uint32_t bits;
+    __builtin_memcpy(&bits, &rows[r * n + place], sizeof bits);
+    return bits;
+  };
+  const std::uint32_t id = word(kRowTriangle), flags = word(kRowFlags);
+  const bool cull = ClosestQuery::culls(params, flags);
+  const auto exact = hn::AndNot(
+      mixed, hn::Or(hn::Or(hn::Eq(wa, zero), hn::Eq(wb, zero)),
+                    hn::Or(hn::Or(hn::Eq(wc, zero), hn::Eq(t, zero)), hn::Lt(hn::Abs(det), thin))));
+  auto hit = hn::AndNot(mixed, hn::And(hn::Le(near, far), hn::Ge(t, of_ray(p.tmin))));
+  hit = hn::AndNot(exact, hit);
+  if (cull) hit = hn::AndNot(hn::Lt(least, zero), hit);
+  const V tmax = of_ray(p.tmax);
+  // Of equal distances the lowest index counts; kNone is above all of them.
+  const auto owner = hn::Load(du, p.triangle + first);
+  const auto lower_id = hn::RebindMask(d, hn::Not(hn::Gt(hn::Set(du, id), owner)));
+  hit = hn::And(hit, hn::Or(hn::Lt(t, tmax), hn::And(hn::Eq(t, tmax), lower_id)));
+  const bool holes = (flags & kAlphaTest) != 0 && params.alpha != 0;
+  bool changed = false;
+  if (!holes && !hn::AllFalse(d, hit)) {
+    changed = true;
+    hn::Store(hn::IfThenElse(hit, t, tmax), d, p.tmax + first);
+    hn::Store(hn::IfThenElse(hit, t, of_ray(p.t)), d, p.t + first);
+    hn::Store(hn::IfThenElse(hit, hn::Div(wb, det), of_ray(p.u)), d, p.u + first);
+    hn::Store(hn::IfThenElse(hit, hn::Div(wc, det), of_ray(p.v)), d, p.v + first);
+    hn::Store(hn::IfThenElse(hn::RebindMask(du, hit), hn::Set(du, id), owner), du,
+              p.triangle + first);
+  }
+  const auto singly = holes ? hn::Or(exact, hit) : exact;
+  if (hn::AllFalse(d, singly)) return changed;
+  std::uint8_t bits[8];
+  hn::StoreMaskBits(d, singly, bits);
+  for (std::uint32_t left = bits[0]; left != 0; left &= left - 1) {
+    const std::uint32_t k = first + static_cast<std::uint32_t>(lowest_bit(left));
+    const auto point = [&](std::uint32_t r) {
+      return Vec3(rows[r * n + place], rows[(r + 1) * n + place], rows[(r + 2) * n + place]);
+    };
+    TriangleHit found;
+    if (!intersect_triangle(p.slab_ray(k), p.triangle_ray(k), point(0), point(3), point(6),
+                            p.tmin[k], p.tmax[k], cull, &found)) {
+      continue;
+    }
+    if (found.t == p.tmax[k] && id > p.triangle[k]) continue;
+    if (holes && !alpha_passes(scene, word(kRowGeometry), id, found.u, found.v)) continue;
+    p.tmax[k] = p.t[k] = found.t;
+    p.u[k] = found.u;
+    p.v[k] = found.v;
+    p.triangle[k] = id;
+    changed = true;
+  }
+  return changed;
+}
+
+// Returns the number of triangles tested.
+HWY_ATTR HWY_INLINE std::uint32_t visit_leaf(const WideView& tree, const SceneView& scene,
+                                             const RenderParams& params, WideRef leaf, float tmin,
+                                             Packet& p) {
+  const Floats d;
+  using V = hn::Vec<Floats>;
+  const std::uint32_t n = leaf_count(leaf);
+  const float* rows = tree.leaves + std::uint64_t{leaf_first(leaf)} * kLeafRows;
+  V enter[3], leave[3];
+  for (std::uint32_t axis = 0; axis < 3; ++axis) {
+    const V a = hn::LoadU(d, rows + axis * n), b = hn::LoadU(d, rows + (3 + axis) * n);
+    const V c = hn::LoadU(d, rows + (6 + axis) * n);
+    const V lower = hn::Min(hn::Min(a, b), c), upper = hn::Max(hn::Max(a, b), c);
+    const bool negative = (p.octant >> axis) & 1;
+    enter[axis] = negative ? upper : lower;
+    leave[axis] = negative ? lower : upper;
+  }
+  V near;
+  std::uint8_t bits[8];
+  hn::StoreMaskBits(d, meet(p, enter, leave, tmin, &near), bits);
+  bool changed = false;
+  const std::uint32_t tested = bits[0] & ((1u << n) - 1u);
+  for (std::uint32_t left = tested; left != 0; left &= left - 1) {
+    const auto place = static_cast<std::uint32_t>(lowest_bit(left));
+    for (std::uint32_t first = 0; first < kPacketRays; first += 8) {
+      changed |= test(scene, params, p, first, rows, n, place);
+    }
+  }
+  const auto count = static_cast<std::uint32_t>(count_bits(tested));
+  if (!changed) return count;
+  V most = hn::Load(d, p.tmax);
+  for (std::uint32_t first = 8; first < kPacketRays; first += 8)
+    most = hn::Max(most, hn::Load(d, p.tmax + first));
+  p.beam_tmax = hn::GetLane(hn::MaxOfLanes(d, most));
+  return count;
+}
+
+// Closest hits of rays[0, count), count <= kPacketRays. False: they are too far apart for a packet,
+// and no hits are written.
+HWY_ATTR HWY_INLINE bool trace_packet(const WideView& tree, const SceneView& scene,
+                                      const RenderParams& params, const Ray* rays,
+                                      std::uint32_t count, Packet& p, Hit* hits) {
+  if (!begin(rays, count, p)) return false;
+  const Floats d;
+  const Words du;
+  const auto order = hn::SetTableIndices(d, kFarToNear[p.octant]);
+  const auto order_u = hn::SetTableIndices(du, kFarToNear[p.octant]);
+  p.stack_t[0] = p.beam_tmin;
+  p.stack_ref[0] = 0;
+  std::uint32_t depth = 1;
+  for (std::uint32_t steps = 0; depth != 0; ++steps) {
+    if (steps > kPacketSteps) return false;
+    --depth;
+    const float tmin = p.stack_t[depth];
+    const WideRef ref = p.stack_ref[depth];
+    if (tmin > p.beam_tmax) continue;
+    if (ref & kLeafRef) {
+      steps += 2 * visit_leaf(tree, scene, params, ref, tmin, p);
+      continue;
+    }
+    const WideNode& node = tree.nodes[ref];
+    const auto* bytes = reinterpret_cast<const std::uint8_t*>(&node);
+    hn::Vec<Floats> enter[3], leave[3], near;
+    for (int axis = 0; axis < 3; ++axis) {
+      enter[axis] = hn::Load(d, reinterpret_cast<const float*>(bytes + p.enter[axis]));
+      leave[axis] = hn::Load(d, reinterpret_cast<const float*>(bytes + (p.enter[axis] ^ 32)));
+    }
+    // The mask must follow the lanes: an empty interval is one that begins at infinity.
+    const auto met = meet(p, enter, leave, tmin, &near);
+    const auto none = hn::Set(d, std::numeric_limits<float>::infinity());
+    const auto sorted = hn::TableLookupLanes(hn::IfThenElse(met, near, none), order);
+    const auto kept = hn::Lt(sorted, none);
+    const auto child = hn::TableLookupLanes(hn::Load(du, node.child), order_u);
+    hn::StoreU(hn::Compress(sorted, kept), d, p.stack_t + depth);
+    hn::StoreU(hn::Compress(child, hn::RebindMask(du, kept)), du, p.stack_ref + depth);
+    depth += static_cast<std::uint32_t>(hn::CountTrue(d, kept));
+  }
+  for (std::uint32_t i = 0; i < count; ++i) hits[i] = {p.t[i], p.u[i], p.v[i], p.triangle[i]};
+  return true;
+}
+
+}  // namespace octrace::kernels::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+#endif

@@ -1,0 +1,261 @@
+// The CPU's own nodes against brute force: one ray, streams and packets give the same bits, for
+// every builder and every instruction set that has a body of its own.
+#include "backend/octree/wide.h"
+
+#include <gtest/gtest.h>
+#include <hwy/targets.h>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cstdio>
+#include <cstring>
+
+#include "kernels/cpu/intersect.h"
+#include "tests/support/brute_force.h"
+#include "tests/support/intensity.h"
+#include "tests/support/meshes.h"
+
+namespace octrace::tests {
+namespace {
+
+using kernels::Hit;
+using kernels::Ray;
+using octree::Builder;
+
+bool same_bits(const Hit& a, const Hit& b) {
+  return a.triangle == b.triangle &&
+         (!a.valid() || (std::bit_cast<std::uint32_t>(a.t) == std::bit_cast<std::uint32_t>(b.t) &&
+                         std::bit_cast<std::uint32_t>(a.u) == std::bit_cast<std::uint32_t>(b.u) &&
+                         std::bit_cast<std::uint32_t>(a.v) == std::bit_cast<std::uint32_t>(b.v)));
+}
+
+std::string describe(const Ray& ray, const Hit& expected, const Hit& found) {
+  char text[512];
+  std::snprintf(text, sizeof text,
+                "ray o=(%a %a %a) d=(%a %a %a) t=[%a %a]: brute force %u t=%a u=%a v=%a, found %u "
+                "t=%a u=%a v=%a",
+                ray.origin.x, ray.origin.y, ray.origin.z, ray.direction.x, ray.direction.y,
+                ray.direction.z, ray.tmin, ray.tmax, expected.triangle, expected.t, expected.u,
+                expected.v, found.triangle, found.t, found.u, found.v);
+  return text;
+}
+
+// Long thin triangles across each other: the builders cut them.
+Mesh make_sticks(std::uint32_t count) {
+  Mesh mesh{"sticks", {}, {}};
+  std::mt19937_64 random(seed());
+  std::uniform_real_distribution<float> unit(-1.0f, 1.0f);
+  const auto point = [&] { return kernels::Vec3(unit(random), unit(random), unit(random)); };
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const kernels::Vec3 a = point(), b = point();
+    mesh.positions.insert(mesh.positions.end(), {a, b, b + 0.1f * point()});
+    mesh.triangles.push_back({3 * i, 3 * i + 1, 3 * i + 2});
+  }
+  return mesh;
+}
+
+std::vector<Mesh> wide_meshes() {
+  std::vector<Mesh> meshes = hard_meshes();
+  meshes.push_back(make_sticks(400));
+  return meshes;
+}
+
+struct Wide : testing::TestWithParam<std::size_t> {
+  Mesh mesh = wide_meshes()[GetParam()];
+
+  octree::Octree build(Builder builder) const {
+    octree::BuildOptions options;
+    options.builder = builder;
+    util::Result<octree::Octree> octree = octree::build(mesh.input(), options);
+    EXPECT_TRUE(octree);
+    return std::move(*octree);
+  }
+
+  // Random rays; with `spread` > 0 every sixteen in a row are a bundle around the first.
+  std::vector<Ray> make_rays(const octree::Octree& octree, std::mt19937_64& random,
+                             std::size_t count, float spread) const {
+    std::uniform_real_distribution<float> unit(-1.0f, 1.0f);
+    std::vector<Ray> rays;
+    for (std::size_t i = 0; i < count; ++i) {
+      if (spread == 0.0f || i % 16 == 0) {
+        rays.push_back(random_ray(mesh, octree, random));
+        continue;
+      }
+      Ray ray = rays[i - i % 16];
+      for (int axis = 0; axis < 3; ++axis) {
+        ray.direction[axis] *= 1.0f + spread * unit(random);
+        if (random() % 4 == 0) ray.origin[axis] *= 1.0f + spread * unit(random);
+      }
+      if (random() % 8 == 0) ray.tmax *= 0.5f;
+      rays.push_back(ray);
+    }
+    return rays;
+  }
+
+  void check(const octree::Octree& octree, const std::vector<Ray>& rays) const {
+    const octree::WideOctree wide = octree::make_wide(octree.view());
+    ASSERT_FALSE(wide.nodes.empty());
+    kernels::SceneView view;
+    view.octree = octree.view();
+    const kernels::CpuTracer tracer(wide.view());
+    const auto count = static_cast<std::uint32_t>(rays.size());
+    std::vector<Hit> stream(count), packets(count);
+    std::vector<float> transmittances(count, -1.0f);
+    using kernels::TraceStatus;
+    ASSERT_EQ(TraceStatus::ok, tracer.closest(view, {}, rays.data(), count, stream.data()));
+    ASSERT_EQ(TraceStatus::ok,
+              tracer.closest_coherent(view, {}, rays.data(), count, packets.data()));
+    ASSERT_EQ(TraceStatus::ok,
+              tracer.transmittance(view, {}, rays.data(), count, transmittances.data()));
+    std::uint64_t hits = 0;
+    for (std::uint32_t i = 0; i < count; ++i) {
+      const Hit expected = brute_force(mesh.positions, mesh.triangles, rays[i]);
+      hits += expected.valid();
+      Hit one;
+      ASSERT_EQ(TraceStatus::ok, tracer.closest(view, {}, rays[i], &one));
+      float transmittance = -1.0f;
+      ASSERT_EQ(TraceStatus::ok, tracer.transmittance(view, {}, rays[i], &transmittance));
+      const char* where = tracer.instruction_set();
+      ASSERT_TRUE(same_bits(expected, one))
+          << where << ", one: " << describe(rays[i], expected, one);
+      ASSERT_TRUE(same_bits(expected, stream[i]))
+          << where << ", stream: " << describe(rays[i], expected, stream[i]);
+      ASSERT_TRUE(same_bits(expected, packets[i]))
+          << where << ", packets: " << describe(rays[i], expected, packets[i]);
+      ASSERT_EQ(expected.valid() ? 0.0f : 1.0f, transmittance) << where << ", ray " << i;
+      ASSERT_EQ(expected.valid() ? 0.0f : 1.0f, transmittances[i]) << where << ", ray " << i;
+    }
+    EXPECT_GT(hits, count / 20) << mesh.name;
+  }
+};
+
+TEST_P(Wide, HitsWhatBruteForceHits) {
+  for (const std::int64_t target : {std::int64_t{HWY_AVX3}, std::int64_t{HWY_AVX2}}) {
+    if ((hwy::SupportedTargets() & target) == 0) continue;
+    hwy::SetSupportedTargetsForTest(target);
+    for (const Builder builder : {Builder::median, Builder::sah, Builder::quality}) {
+      const octree::Octree octree = build(builder);
+      std::mt19937_64 random(seed() + GetParam() * 7919 + static_cast<std::uint64_t>(builder));
+      for (const float spread : {0.0f, 0.05f, 1e-3f}) {
+        SCOPED_TRACE(testing::Message()
+                     << mesh.name << ", seed " << seed() << ", spread " << spread);
+        check(octree, make_rays(octree, random, scaled(20'000) + 5, spread));
+      }
+    }
+    hwy::SetSupportedTargetsForTest(0);
+  }
+}
+
+// Boxes of the leaf slots that hold each triangle.
+using Places = std::vector<std::vector<std::array<kernels::Vec3, 2>>>;
+
+Places places_of_triangles(const Mesh& mesh, const octree::WideOctree& wide) {
+  Places places(mesh.triangles.size());
+  std::vector<bool> reached(wide.nodes.size(), false);
+  const auto visit = [&](const auto& self, std::uint32_t index) -> void {
+    ASSERT_LT(index, wide.nodes.size());
+    ASSERT_FALSE(reached[index]);
+    reached[index] = true;
+    const kernels::WideNode& node = wide.nodes[index];
+    for (int slot = 0; slot < kernels::kChildren; ++slot) {
+      if (node.planes[0][0][slot] > node.planes[0][1][slot]) continue;
+      const kernels::WideRef ref = node.child[slot];
+      if ((ref & kernels::kLeafRef) == 0) {
+        self(self, ref);
+        continue;
+      }
+      const std::uint32_t n = kernels::leaf_count(ref);
+      const float* rows = &wide.leaves[std::size_t{kernels::leaf_first(ref)} * kernels::kLeafRows];
+      for (std::uint32_t i = 0; i < n; ++i) {
+        std::uint32_t id;
+        std::memcpy(&id, &rows[kernels::kRowTriangle * n + i], sizeof id);
+        ASSERT_LT(id, places.size());
+        std::array<kernels::Vec3, 2> box;
+        const kernels::Triangle& t = mesh.triangles[id];
+        for (std::uint32_t axis = 0; axis < 3; ++axis) {
+          const int a = static_cast<int>(axis);
+          EXPECT_EQ(mesh.positions[t.a][a], rows[axis * n + i]);
+          EXPECT_EQ(mesh.positions[t.b][a], rows[(3 + axis) * n + i]);
+          EXPECT_EQ(mesh.positions[t.c][a], rows[(6 + axis) * n + i]);
+          box[0][a] = node.planes[axis][0][slot];
+          box[1][a] = node.planes[axis][1][slot];
+        }
+        places[id].push_back(box);
+      }
+    }
+  };
+  visit(visit, 0);
+  for (const bool each : reached) EXPECT_TRUE(each);
+  return places;
+}
+
+// Triangles that are cut lie in several leaves, and every point of them in the box of one; BLEND
+// triangles, which dim a ray each time they are met, lie in one leaf.
+TEST_P(Wide, HoldsAllOfEveryTriangle) {
+  const std::vector<std::uint32_t> geometry(mesh.triangles.size(), 0);
+  for (const Builder builder : {Builder::median, Builder::sah, Builder::quality}) {
+    for (const std::uint32_t flags : {0u, kernels::kBlend}) {
+      SCOPED_TRACE(testing::Message()
+                   << mesh.name << ", builder " << static_cast<int>(builder) << ", " << flags);
+      octree::BuildOptions options;
+      options.builder = builder;
+      const octree::Octree octree = std::move(
+          *octree::build({mesh.positions, mesh.triangles, geometry, {&flags, 1}}, options));
+      const Places places = places_of_triangles(mesh, octree::make_wide(octree.view()));
+      std::size_t references = 0, outside = 0;
+      for (std::size_t id = 0; id < places.size(); ++id) {
+        references += places[id].size();
+        ASSERT_FALSE(places[id].empty()) << id;
+        if (flags != 0 || builder == Builder::median) {
+          EXPECT_EQ(1u, places[id].size()) << id;
+        }
+        const kernels::Triangle& t = mesh.triangles[id];
+        const kernels::Vec3 a = mesh.positions[t.a], b = mesh.positions[t.b],
+                            c = mesh.positions[t.c];
+        constexpr int kSteps = 8;
+        for (int i = 0; i <= kSteps; ++i) {
+          for (int j = 0; i + j <= kSteps; ++j) {
+            kernels::Vec3 point;
+            for (int axis = 0; axis < 3; ++axis) {
+              point[axis] = static_cast<float>(
+                  (double{a[axis]} * i + double{b[axis]} * j + double{c[axis]} * (kSteps - i - j)) /
+                  kSteps);
+            }
+            outside += std::none_of(places[id].begin(), places[id].end(), [&](const auto& box) {
+              bool inside = true;
+              for (int axis = 0; axis < 3; ++axis) {
+                inside &= box[0][axis] <= point[axis] && point[axis] <= box[1][axis];
+              }
+              return inside;
+            });
+          }
+        }
+      }
+      EXPECT_EQ(0u, outside);
+      EXPECT_EQ(octree.triangles.size(), references);
+      if (flags == 0 && builder == Builder::quality && mesh.name == "sticks") {
+        EXPECT_GT(references, mesh.triangles.size());
+      }
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Meshes, Wide, testing::Range<std::size_t>(0, wide_meshes().size()));
+
+TEST(WideOctree, IsEmptyOverNothingAndOverBrokenNodes) {
+  EXPECT_TRUE(octree::make_wide({}).view().empty());
+  const Mesh mesh = make_sphere(20, kernels::Vec3(0.0f), 1.0f);
+  octree::Octree octree = std::move(*octree::build(mesh.input(), {}));
+  ASSERT_FALSE(octree::make_wide(octree.view()).view().empty());
+  octree::Octree cycle = octree, outside = octree, short_of = octree;
+  cycle.nodes[0].first_child = 0;
+  outside.nodes[0].first_child = 1u << 30;
+  short_of.triangles.resize(octree.triangles.size() / 2);
+  for (const octree::Octree& broken : {cycle, outside, short_of}) {
+    EXPECT_TRUE(octree::make_wide(broken.view()).view().empty());
+  }
+}
+
+}  // namespace
+}  // namespace octrace::tests
