@@ -13,6 +13,7 @@
 #include "backend/app/options.h"
 #include "backend/app/reference_batch.h"
 #include "backend/app/reference_limits.h"
+#include "backend/app/time_options.h"
 #include "backend/app/validation_views.h"
 #include "backend/image/image.h"
 #include "backend/util/interrupt.h"
@@ -42,6 +43,7 @@ struct ValidateRequest {
   std::vector<std::string> tolerances;
   int timeout = 120;
   SceneRequest scene;
+  TimeOptions time;
   ViewOptions views;
   ReferenceOptions references;
 };
@@ -50,7 +52,8 @@ constexpr const char* kHelp =
     R"(Renders every scene and camera with octrace and with each program, compares masks, depths and object
 ids, and prints one line a comparison. POV-Ray gets the triangles that octrace traces, so it checks the
 tracer and the camera; Blender reads the original file with its own importer, so it checks the loader
-as well. Every camera of the scene is used; a scene that has none is framed from three sides. Back faces and
+as well, and with --time or --frame its own evaluation of the animation, which is glTF's at keys only.
+Every camera of the scene is used; a scene that has none is framed from three sides. Back faces and
 alpha MASK are treated alike on both sides; BLEND is opaque to depth.
 
 Exit code 0: all agree; 1: some differ; 4: a program is missing; 5: a program failed.
@@ -153,6 +156,7 @@ Result<void> add_scene(State& run, const std::string& source, Batch& batch) {
   SceneRequest scene_request = request.scene;
   scene_request.source = source;
   scene_request.need_textures = false;
+  set_time(request.time, scene_request);
   auto session = open_scene(scene_request);
   if (!session) return session.error();
   auto views = render_views((*session)->scene, (*session)->octree, request.views);
@@ -341,6 +345,7 @@ void declare_options(CLI::App& command, ValidateRequest& request) {
   command
       .add_option("--scene", request.scene.scene, "index of the glTF scene [the file's default]")
       ->check(CLI::NonNegativeNumber);
+  add_time_options(command, request.time);
   command
       .add_option("--threads", request.scene.build.threads,
                   "threads for octrace and for all programs together; 0: all cores [0]")

@@ -76,11 +76,19 @@ ordered_json lights(const scene::SceneInfo& info) {
 ordered_json animations(const scene::SceneInfo& info) {
   ordered_json out = ordered_json::array();
   for (const auto& animation : info.animations) {
+    ordered_json targets = ordered_json::array();
+    for (const auto& target : animation.targets) {
+      targets.push_back({{"node", target.node},
+                         {"path", target.path},
+                         {"interpolation", target.interpolation},
+                         {"keys", target.keys}});
+    }
     out.push_back({{"name", animation.name},
                    {"channels", animation.channels},
                    {"start", animation.start},
                    {"end", animation.end},
-                   {"paths", animation.paths}});
+                   {"paths", animation.paths},
+                   {"targets", std::move(targets)}});
   }
   return out;
 }

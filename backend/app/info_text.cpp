@@ -87,8 +87,9 @@ void content_part(const scene::SceneInfo& info, Text& text) {
   }
   for (std::size_t i = 0; i < info.animations.size(); ++i) {
     const auto& animation = info.animations[i];
-    text.line("animation {} {}: {:g} s to {:g} s, {} channels ({})", i, quoted(animation.name),
-              animation.start, animation.end, animation.channels, fmt::join(animation.paths, ", "));
+    text.line("animation {} {}: {:g} s to {:g} s, {} channels of {} nodes ({})", i,
+              quoted(animation.name), animation.start, animation.end, animation.channels,
+              animation.nodes, fmt::join(animation.paths, ", "));
   }
   for (std::size_t i = 0; i < info.skins.size(); ++i) {
     text.line("skin {} {}: {} joints", i, quoted(info.skins[i].name), info.skins[i].joints);

@@ -77,6 +77,8 @@ Result<void> ReferenceBatch::add(const SceneRequest& request, const scene::Scene
 
   BlenderEntry entry{{.file = "",
                       .gltf_scene = request.scene,
+                      .seconds = request.time,
+                      .animation = request.animation,
                       .cull = options_.cull,
                       .alpha = options_.alpha,
                       .views = {}},

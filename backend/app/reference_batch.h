@@ -36,7 +36,7 @@ class ReferenceBatch {
   static util::Result<ReferenceBatch> create(const ReferenceOptions& options);
 
   // Exports now, so that the scene need not stay. Blender reads the file itself, with its own
-  // importer; a built-in scene is exported to glTF for it.
+  // importer, and evaluates an animation itself; a built-in scene is exported to glTF for it.
   util::Result<void> add(const SceneRequest& request, const scene::Scene& scene,
                          std::span<const scene::Camera> cameras);
   std::size_t views() const { return views_.size(); }

@@ -5,9 +5,10 @@
 namespace octrace::app {
 
 scene::Time TimeOptions::time() const {
+  if (animation == "none") return {};
   if (seconds) return seconds;
   if (frame) return scene::frame_time(static_cast<double>(*frame), fps);
-  return animation.empty() || animation == "none" ? scene::Time() : scene::Time(0.0);
+  return animation.empty() ? scene::Time() : scene::Time(0.0);
 }
 
 // From the frame's number where there is one, so that it is the very time of that frame.

@@ -131,7 +131,15 @@ SceneInfo::AnimationEntry animation_entry(const gltf::Document& document, std::s
   entry.name = name_of(model.animations, index, "animation");
   entry.channels = animation.channels.size();
   std::set<std::string> paths;
-  for (const auto& channel : animation.channels) paths.insert(channel.target_path);
+  std::set<int> nodes;
+  for (const auto& channel : animation.channels) {
+    const auto& sampler = animation.samplers[channel.sampler];
+    paths.insert(channel.target_path);
+    entry.targets.push_back({channel.target_node, channel.target_path, sampler.interpolation,
+                             model.accessors[sampler.input].count});
+    if (channel.target_node >= 0) nodes.insert(channel.target_node);
+  }
+  entry.nodes = nodes.size();
   entry.paths.assign(paths.begin(), paths.end());
   // Key times ascend and their accessors must state min and max; the data itself need not be read.
   bool first = true;

@@ -51,6 +51,13 @@ struct SceneInfo {
     std::uint64_t channels = 0;
     double start = 0.0, end = 0.0;   // seconds
     std::vector<std::string> paths;  // translation, rotation, scale, weights; sorted
+    struct Target {
+      int node = -1;  // -1: an extension's own target, which is left out
+      std::string path, interpolation;
+      std::uint64_t keys = 0;
+    };
+    std::vector<Target> targets;  // by channel
+    std::uint64_t nodes = 0;      // that some channel moves
   };
   struct SkinEntry {
     std::string name;

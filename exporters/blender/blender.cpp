@@ -48,6 +48,9 @@ nlohmann::ordered_json job_record(const std::vector<BlenderScene>& scenes) {
     record["file"] = scene.file;
     record["gltf_scene"] = nullptr;
     if (scene.gltf_scene) record["gltf_scene"] = *scene.gltf_scene;
+    record["seconds"] = nullptr;
+    if (scene.seconds) record["seconds"] = *scene.seconds;
+    record["animation"] = scene.animation;
     record["cull"] = scene.cull;
     record["alpha"] = scene.alpha;
     record["views"] = nlohmann::ordered_json::array();

@@ -21,8 +21,12 @@ struct BlenderView {
 };
 
 struct BlenderScene {
-  std::string file;                // the original .gltf or .glb, absolute or as for output
-  std::optional<int> gltf_scene;   // as --scene N; default: the file's own, else 0, else all nodes
+  std::string file;               // the original .gltf or .glb, absolute or as for output
+  std::optional<int> gltf_scene;  // as --scene N; default: the file's own, else 0, else all nodes
+  // Blender's own evaluation of an animation (a name, else an index; empty: the first) at a time;
+  // none: at rest. It has glTF's values at keys, but its own between them: no arcs, no tangents.
+  std::optional<double> seconds;
+  std::string animation;
   bool cull = true, alpha = true;  // as in PovrayOptions
   std::vector<BlenderView> views;
 };

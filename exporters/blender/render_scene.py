@@ -4,10 +4,12 @@
 #
 #   blender -b --factory-startup -noaudio --python-exit-code 3 -P THIS_FILE
 #
-# JOB comes before this text: {"scenes": [{"file", "gltf_scene", "cull", "alpha", "views": [{"type",
+# JOB comes before this text: {"scenes": [{"file", "gltf_scene", "seconds" (null: at rest), "animation"
+# (a name, else an index; empty: the first), "cull", "alpha", "views": [{"type",
 # "matrix" (camera to world as glTF has it, orthonormal, by columns), "top", "bottom", "left", "right"
 # (borders of the image in the plane at depth 1), "width", "height", "clip_start", "clip_end",
 # "output"}]}]}.
+import math
 import os
 import sys
 import tempfile
@@ -32,14 +34,20 @@ def absolute(path):
     return os.path.join(FOLDER, path)
 
 
-def import_gltf(path):
-    """Imports with Blender's own importer, in the pose of the nodes: no animation is created at all,
-    so none can move anything. Returns the importer's state, which knows glTF's indices."""
+def import_gltf(path, animated):
+    """Imports with Blender's own importer. At rest, in the pose of the nodes: no animation is created
+    at all, so none can move anything. Returns the importer's state, which knows glTF's indices."""
     from io_scene_gltf2.blender.imp import gltf2_blender_scene
 
     states = []
     keep = gltf2_blender_scene.BlenderScene.create_animations
-    gltf2_blender_scene.BlenderScene.create_animations = staticmethod(states.append)
+
+    def create(gltf):
+        states.append(gltf)
+        if animated:
+            keep(gltf)
+
+    gltf2_blender_scene.BlenderScene.create_animations = staticmethod(create)
     try:
         bpy.ops.import_scene.gltf(filepath=path)
     finally:
@@ -47,6 +55,18 @@ def import_gltf(path):
     if not states:
         raise RuntimeError("Blender imported nothing")
     return states[0]
+
+
+def choose_animation(gltf, choice):
+    """Blender shows the file's first animation unless told otherwise."""
+    from io_scene_gltf2.blender.imp.gltf2_blender_animation import BlenderAnimation
+
+    animations = gltf.data.animations or []
+    if not animations:
+        return
+    named = [i for i, animation in enumerate(animations) if choice and animation.name == choice]
+    index = named[0] if named else int(choice or 0)
+    BlenderAnimation.restore_animation(gltf, animations[index].track_name)
 
 
 def nodes_of_scene(gltf, number):
@@ -152,8 +172,21 @@ def prepare_materials(cull, alpha):
         simplify(material, cull, alpha)
 
 
+def widen_shape_keys():
+    """The importer lets a morph target's weight leave [0, 1] only as far as its first key does."""
+    for keys in bpy.data.shape_keys:
+        for block in keys.key_blocks:
+            block.slider_min, block.slider_max = -10.0, 10.0  # as far as Blender goes
+
+
+def set_time(scene, seconds):
+    # The importer puts keys at seconds * fps, whatever fps_base says.
+    frame = (seconds or 0.0) * scene.render.fps
+    whole = math.floor(frame)
+    scene.frame_set(whole, subframe=frame - whole)
+
+
 def prepare_render(scene):
-    scene.frame_set(0)
     scene.render.engine = "CYCLES"
     cycles = scene.cycles
     cycles.device = "CPU"
@@ -260,7 +293,12 @@ def main(job):
     for entry in job["scenes"]:
         try:
             bpy.ops.wm.read_factory_settings(use_empty=True)
-            gltf = import_gltf(absolute(entry["file"]))
+            seconds = entry.get("seconds")
+            gltf = import_gltf(absolute(entry["file"]), seconds is not None)
+            if seconds is not None:
+                choose_animation(gltf, entry.get("animation", ""))
+                widen_shape_keys()
+            set_time(bpy.context.scene, seconds)
             prepare_objects(gltf, entry.get("gltf_scene"))
             prepare_materials(entry["cull"], entry["alpha"])
             prepare_render(bpy.context.scene)

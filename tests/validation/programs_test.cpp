@@ -10,6 +10,7 @@
 
 #include "backend/image/image.h"
 #include "backend/util/atomic_file.h"
+#include "tests/property/animated_scenes.h"
 #include "tests/validation/bug_scene.h"
 #include "tests/validation/synthetic.h"
 #include "validation/reference/process.h"
@@ -224,6 +225,46 @@ TEST_F(RealPrograms, AgreeOnOtherPeoplesScenes) {
     arguments.push_back(fs::absolute(shared / scene).string());
   }
   expect_agreement(std::move(arguments), 36);
+}
+
+// Blender evaluates the animations itself, with its own importer. At keys it has what glTF has.
+TEST_F(RealPrograms, BlenderAgreesAtKeyTimes) {
+  const fs::path shared = fs::path(OCTRACE_SHARED_SCENES) / "valid";
+  if (!fs::exists(shared)) GTEST_SKIP() << shared << " is missing";
+  const std::string three = fs::absolute(shared / "03_all_animations/03_all_animations.gltf");
+  std::vector<std::string> arguments{"validate", three};
+  for (const char* scene :
+       {"01_morphed_cube/01_morphed_cube.gltf", "03_animated_cube/03_animated_cube.gltf",
+        "03_skinned_cylinder/03_skinned_cylinder.gltf",
+        "AnimatedMorphSphere/AnimatedMorphSphere.gltf", "CesiumMilkTruck/CesiumMilkTruck.glb",
+        "simple_skin/simple_skin.gltf"}) {
+    arguments.push_back(fs::absolute(shared / scene).string());
+  }
+  const std::vector<std::string> common{"--against", "blender", "--size", "160x120"};
+  arguments.insert(arguments.end(), common.begin(), common.end());
+  arguments.insert(arguments.end(), {"--frame", "24"});  // a key of all of them
+  expect_agreement(std::move(arguments), 21);
+  for (const char* other : {"CubeAction", "1"}) {
+    std::vector<std::string> chosen{"validate", three, "--time", "1", "--animation", other};
+    chosen.insert(chosen.end(), common.begin(), common.end());
+    expect_agreement(std::move(chosen), 3);
+  }
+}
+
+// Every path and interpolation, mirrors, two sets of joints, sparse targets, weights beyond [0, 1]:
+// at the first keys, and held after the last ones.
+TEST_F(RealPrograms, BlenderAgreesAtTheEndsOfOurOwnAnimations) {
+  std::vector<std::string> arguments{"validate"};
+  for (const tests::AnimatedScene& scene : tests::animated_scenes()) {
+    std::ofstream(file(scene.name + ".gltf")) << scene.file.text();
+    arguments.push_back(scene.name + ".gltf");
+  }
+  arguments.insert(arguments.end(), {"--against", "blender", "--size", "160x120", "--time"});
+  for (const char* time : {"0", "100"}) {
+    std::vector<std::string> at = arguments;
+    at.emplace_back(time);
+    expect_agreement(std::move(at), 13);
+  }
 }
 
 TEST_F(RealPrograms, ABugIsAnExitCode) {
