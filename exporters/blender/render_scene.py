@@ -34,18 +34,28 @@ def absolute(path):
     return os.path.join(FOLDER, path)
 
 
-def import_gltf(path, animated):
+def import_gltf(path, animated, choice):
     """Imports with Blender's own importer. At rest, in the pose of the nodes: no animation is created
     at all, so none can move anything. Returns the importer's state, which knows glTF's indices."""
     from io_scene_gltf2.blender.imp import gltf2_blender_scene
+    from io_scene_gltf2.blender.imp.gltf2_blender_animation import BlenderAnimation
 
     states = []
     keep = gltf2_blender_scene.BlenderScene.create_animations
 
     def create(gltf):
         states.append(gltf)
-        if animated:
+        if not animated:
+            return
+        # The importer ends by playing the first animation. Another one is played instead of that and
+        # not after it, or what only the first one moves would stay where it put it.
+        restore = BlenderAnimation.restore_animation
+        BlenderAnimation.restore_animation = staticmethod(
+            lambda state, first: restore(state, chosen_track(state, choice)))
+        try:
             keep(gltf)
+        finally:
+            BlenderAnimation.restore_animation = staticmethod(restore)
 
     gltf2_blender_scene.BlenderScene.create_animations = staticmethod(create)
     try:
@@ -57,16 +67,11 @@ def import_gltf(path, animated):
     return states[0]
 
 
-def choose_animation(gltf, choice):
-    """Blender shows the file's first animation unless told otherwise."""
-    from io_scene_gltf2.blender.imp.gltf2_blender_animation import BlenderAnimation
-
-    animations = gltf.data.animations or []
-    if not animations:
-        return
+def chosen_track(gltf, choice):
+    """The NLA track of an animation by its name, else its index; the first where none is named."""
+    animations = gltf.data.animations
     named = [i for i, animation in enumerate(animations) if choice and animation.name == choice]
-    index = named[0] if named else int(choice or 0)
-    BlenderAnimation.restore_animation(gltf, animations[index].track_name)
+    return animations[named[0] if named else int(choice or 0)].track_name
 
 
 def nodes_of_scene(gltf, number):
@@ -294,9 +299,9 @@ def main(job):
         try:
             bpy.ops.wm.read_factory_settings(use_empty=True)
             seconds = entry.get("seconds")
-            gltf = import_gltf(absolute(entry["file"]), seconds is not None)
+            gltf = import_gltf(absolute(entry["file"]), seconds is not None,
+                               entry.get("animation", ""))
             if seconds is not None:
-                choose_animation(gltf, entry.get("animation", ""))
                 widen_shape_keys()
             set_time(bpy.context.scene, seconds)
             prepare_objects(gltf, entry.get("gltf_scene"))
