@@ -1,6 +1,8 @@
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <cmath>
+#include <cstdio>
 #include <fstream>
 #include <glm/gtc/matrix_transform.hpp>
 #include <glm/gtc/quaternion.hpp>
@@ -181,9 +183,13 @@ TEST(SceneCamera, FramedBoundsLieWithinTheImageAndInFrontOfZnear) {
 class CameraFile : public ::testing::Test {
  protected:
   util::Result<Camera> read(const std::string& text) {
-    const std::string path = ::testing::TempDir() + "octrace_camera.json";
+    // Cases run at the same time, each in a process of its own.
+    const std::string path =
+        ::testing::TempDir() + "octrace_camera_" + std::to_string(::getpid()) + ".json";
     std::ofstream(path) << text;
-    return read_camera_file(path);
+    util::Result<Camera> camera = read_camera_file(path);
+    std::remove(path.c_str());
+    return camera;
   }
 };
 
