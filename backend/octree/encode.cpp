@@ -3,40 +3,11 @@
 #include <limits>
 
 #include "backend/octree/tree.h"
+#include "kernels/quantise.h"
 
 namespace octrace::octree {
 
-namespace {
-
-// Smaller steps would make products in the slab test underflow; a box that small is a point anyway.
-constexpr int kMinExponent = -60;
-
-// The smallest exponent whose 255 steps from the origin reach the extent.
-std::int8_t exponent_for(double origin, double end) {
-  const double extent = end - origin;
-  int exponent = kMinExponent;
-  if (extent > 0.0) {
-    std::frexp(extent / 255.0, &exponent);
-    exponent = std::max(exponent, kMinExponent);
-    // frexp gives a power of two above the quotient; one less may do, and is tried first.
-    if (exponent > kMinExponent && origin + std::ldexp(255.0, exponent - 1) >= end) --exponent;
-  }
-  return static_cast<std::int8_t>(exponent);
-}
-
-std::uint8_t step_below(double origin, double scale, double value) {
-  double q = std::clamp(std::floor((value - origin) / scale), 0.0, 255.0);
-  while (q > 0.0 && origin + q * scale > value) q -= 1.0;
-  return static_cast<std::uint8_t>(q);
-}
-
-std::uint8_t step_above(double origin, double scale, double value) {
-  double q = std::clamp(std::ceil((value - origin) / scale), 0.0, 255.0);
-  while (q < 255.0 && origin + q * scale < value) q += 1.0;
-  return static_cast<std::uint8_t>(q);
-}
-
-}  // namespace
+using kernels::exponent_for, kernels::step_above, kernels::step_below;
 
 Slots slots_by_octant(std::span<const Child> children, const Box& parent) {
   // For each child and slot the cost is how far the child's centre lies against the slot's octant;
