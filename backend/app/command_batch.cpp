@@ -119,7 +119,7 @@ void tell(const batch::Plan& plan, const batch::RunSummary& summary) {
 
 Result<util::Exit> merge(const batch::Plan& plan, const BatchRequest& request) {
   const util::InterruptGuard interruptible;
-  auto results = batch::merge_job(plan, request.run.limits);
+  auto results = batch::merge_job(plan, request.run.limits, request.run.wait_lock);
   if (!results) return results.error();
   for (const auto& [first, last] : results->missing) {
     util::log_error(first == last ? fmt::format("view {} is missing", first)
@@ -165,6 +165,12 @@ void declare_running(CLI::App& command, BatchRequest& request) {
       "--merge", request.merge,
       "render nothing: write cameras.json and the like from the journals of all shards");
   command.add_flag("--force", request.run.force, "forget what was done, and start anew");
+  command
+      .add_option("--wait-lock", request.run.wait_lock,
+                  "wait so long where another process holds this shard's lock, or with --merge any "
+                  "lock of the folder; a Slurm task waits only for its own earlier run [0]")
+      ->check(CLI::Range(0.0, 1e6).description(""))
+      ->type_name("SECONDS");
   command.add_option("--shard", request.shard, "only part I of N, from 1 [all]")->type_name("I/N");
   command
       .add_option("--device", request.device, "auto, cpu, cuda or cuda:N, whatever the job says")

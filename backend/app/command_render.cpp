@@ -12,6 +12,7 @@
 #include "backend/app/render_stats.h"
 #include "backend/app/time_options.h"
 #include "backend/batch/camera_choice.h"
+#include "backend/batch/next_frame.h"
 #include "backend/batch/output.h"
 #include "backend/image/image.h"
 #include "backend/render/device.h"
@@ -220,10 +221,6 @@ util::Result<Plan> make_plan(RenderOptions& options) {
 util::Result<render::TraceStats> trace(const RenderOptions& options, const SceneSession& session,
                                        const scene::Camera& camera, Progress& progress,
                                        render::Framebuffer& framebuffer) {
-  const auto rays = [&](const scene::Camera& at) {
-    return scene::make_ray_camera(at, static_cast<int>(framebuffer.width()),
-                                  static_cast<int>(framebuffer.height()));
-  };
   const std::unique_ptr<render::Renderer> renderer =
       render::make_renderer(session.scene, session.octree, options.device_choice);
   render::Settings settings;
@@ -236,10 +233,12 @@ util::Result<render::TraceStats> trace(const RenderOptions& options, const Scene
   if (framebuffer.aovs().test(static_cast<std::size_t>(kernels::Aov::motion))) {
     next = session.at(options.time.next());
     if (!next) return next.error();
-    settings.next = {next->positions, rays(scene::camera_at(camera, session.scene, *next))};
-    if (next->instancing) settings.next->instances = next->instancing->instances;
+    settings.next = batch::next_frame(session.scene, camera, *next,
+                                      {framebuffer.width(), framebuffer.height()});
   }
-  return renderer->render(rays(camera), settings, framebuffer);
+  return renderer->render(scene::make_ray_camera(camera, static_cast<int>(framebuffer.width()),
+                                                 static_cast<int>(framebuffer.height())),
+                          settings, framebuffer);
 }
 
 util::Result<void> write_outputs(const RenderOptions& options, const Plan& plan,

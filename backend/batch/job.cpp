@@ -26,11 +26,24 @@ Result<std::size_t> word(const JsonAt& json, std::initializer_list<std::string_v
   return static_cast<std::size_t>(found - words.begin());
 }
 
+// A name, or an index as text.
+Result<std::string> parse_variant(const JsonAt& json) {
+  if (!json.value().is_number()) return json.text();
+  auto index = json.integer(0, 1 << 24);
+  return index ? Result<std::string>(std::to_string(*index)) : index.error();
+}
+
 Result<JobScene> parse_scene(const JsonAt& json, const Job& job) {
   JobScene scene;
+  scene.variant = job.variant;
   JsonAt path = json;
   if (json.value().is_object()) {
-    if (auto ok = json.object({"path", "name", "scene"}, {"path"}); !ok) return ok.error();
+    if (auto ok = json.object({"path", "name", "scene", "variant"}, {"path"}); !ok) {
+      return ok.error();
+    }
+    if (auto ok = read_member(json, "variant", scene.variant, parse_variant); !ok) {
+      return ok.error();
+    }
     path = json.at("path");
     if (json.has("name")) {
       auto name = json.at("name").text();
@@ -239,14 +252,15 @@ Result<Job> parse_job(const Json& root, const std::string& path, const util::Lim
   job.folder = slash == std::string::npos ? "" : path.substr(0, slash + 1);
   const JsonAt json(root, path, util::Exit::usage);
   if (auto ok = json.object(
-          {"version",     "scenes",         "cameras",    "frames",     "fps",     "animation",
-           "size",        "aovs",           "output",     "device",     "spp",     "seed",
-           "sky",         "cull",           "alpha",      "background", "objects", "masks",
-           "depth_scale", "missing_images", "compression"},
+          {"version", "scenes",      "cameras",        "frames",     "fps",        "animation",
+           "variant", "size",        "aovs",           "output",     "device",     "spp",
+           "seed",    "sky",         "cull",           "alpha",      "background", "objects",
+           "masks",   "depth_scale", "missing_images", "compression"},
           {"version", "scenes", "size", "aovs", "output"});
       !ok)
     return ok.error();
   if (auto version = json.at("version").integer(1, 1); !version) return version.error();
+  if (auto ok = read_member(json, "variant", job.variant, parse_variant); !ok) return ok.error();
   if (auto ok = parse_scenes(json.at("scenes"), job); !ok) return ok.error();
   if (json.has("frames")) {
     if (auto ok = parse_frame_member(json.at("frames"), job, limits); !ok) return ok.error();
@@ -261,13 +275,6 @@ Result<Job> parse_job(const Json& root, const std::string& path, const util::Lim
   if (auto ok = parse_size_member(json.at("size"), job, limits); !ok) return ok.error();
   auto words = parse_aov_words(json.at("aovs"), job.aovs);
   if (!words) return words.error();
-  // At rest motion is 0; between frames it needs the next one, which a batch does not look at.
-  if (!job.frames.empty() && job.aovs.test(static_cast<std::size_t>(kernels::Aov::motion))) {
-    util::Error error = json.at("aovs").error(
-        "motion of frames is not rendered by a batch: use octrace render --frame N --aov motion");
-    error.exit = util::Exit::unsupported;
-    return error;
-  }
   auto outputs = parse_outputs(json.at("output"), *words, job);
   if (!outputs) return outputs.error();
   job.outputs = std::move(*outputs);

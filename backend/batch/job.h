@@ -21,6 +21,7 @@ struct JobScene {
   std::string path;          // as the job has it
   std::string name;          // what {scene} stands for, before path_name()
   std::optional<int> scene;  // index of the glTF scene
+  std::string variant;       // name or index; empty: the file's own materials
 };
 
 struct AllCameras {};
@@ -56,6 +57,7 @@ struct Job {
   std::vector<std::int64_t> frames;  // empty: at rest, as frame 0
   double fps = 24.0;
   std::optional<std::variant<std::string, std::int64_t>> animation;  // "none": no movement
+  std::string variant;                                               // of scenes that name none
   ImageSize size;
   render::AovSet aovs;
   std::vector<JobOutput> outputs;

@@ -70,6 +70,7 @@ ordered_json Plan::meaning(const util::Limits& limits) const {
   for (const JobScene& scene : job_.scenes) {
     ordered_json entry = {{"path", scene.path}, {"name", scene.name}};
     if (scene.scene) entry["scene"] = *scene.scene;
+    if (!scene.variant.empty()) entry["variant"] = scene.variant;
     entry["file"] = file_identity(scene, limits);
     json["scenes"].push_back(std::move(entry));
   }

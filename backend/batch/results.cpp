@@ -203,14 +203,14 @@ Result<JobResults> write_job_results(const Plan& plan) {
   return count(plan, *gathered);
 }
 
-Result<JobResults> merge_job(const Plan& plan, const util::Limits& limits) {
+Result<JobResults> merge_job(const Plan& plan, const util::Limits& limits, double wait_lock) {
   if (journals_in(plan.folder()).empty()) {
     return util::Error{util::Exit::io, "IO_ERROR",
                        "no journal is there: nothing of this job was rendered",
                        state_folder(plan.folder()), ""};
   }
   // Shard 1 of 1 is at odds with every other division and with itself.
-  auto lock = RunLock::acquire(plan.folder(), Shard());
+  auto lock = RunLock::acquire(plan.folder(), Shard(), {wait_lock, true});
   if (!lock) return lock.error();
   if (auto same = check_job(plan, limits); !same) return same.error();
   auto results = write_job_results(plan);

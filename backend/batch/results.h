@@ -36,7 +36,7 @@ struct JobResults {
 util::Result<JobResults> write_job_results(const Plan& plan);
 
 // `octrace batch JOB.json --merge`: the same for the journals of all shards, and summary.json. Exit
-// 5 while a run holds a lock of the folder.
-util::Result<JobResults> merge_job(const Plan& plan, const util::Limits& limits);
+// 5 where a run holds a lock of the folder for longer than `wait_lock` seconds.
+util::Result<JobResults> merge_job(const Plan& plan, const util::Limits& limits, double wait_lock);
 
 }  // namespace octrace::batch

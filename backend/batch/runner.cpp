@@ -12,6 +12,7 @@
 #include "backend/batch/camera_choice.h"
 #include "backend/batch/camera_sets.h"
 #include "backend/batch/hash.h"
+#include "backend/batch/next_frame.h"
 #include "backend/batch/scene_session.h"
 #include "backend/batch/state.h"
 #include "backend/batch/view_record.h"
@@ -77,6 +78,7 @@ class Run {
   std::string scene_name_;
   scene::Bounds rest_bounds_;          // of the scene being traced
   std::optional<std::int64_t> frame_;  // where it stands; none: at rest
+  std::optional<scene::Moment> next_;  // the frame after, where motion is asked for
   std::future<Opened> ahead_;
   std::mutex report_mutex_;
   ViewWriter writer_;
@@ -114,6 +116,7 @@ Opened Run::open(std::size_t index) const {
   SceneRequest request;
   request.source = scene.source;
   request.scene = scene.scene;
+  request.variant = scene.variant;
   request.need_textures = needs_textures(plan_.needed_aovs());
   request.missing_images_warn = job.missing_images_warn;
   request.verify = options_.verify;
@@ -175,6 +178,7 @@ void Run::run_scene(const Work& work, Opened opened, const Work* next) {
   rest_bounds_ = session.scene.bounds;
   const auto renderer = render::make_renderer(session.scene, session.octree, options_.device);
   frame_.reset();
+  next_.reset();
   std::uint64_t left = work.left;
   for (std::uint64_t index = work.begin; index < work.end && !stopping(); ++index) {
     if (done_.views[index]) continue;
@@ -198,6 +202,13 @@ Result<void> Run::move_to(const View& view, SceneSession& session, render::Rende
   auto moved = session.move_to(view.time);
   if (!moved) return moved.error();
   if (auto fresh = renderer.refresh(*moved); !fresh) return fresh;
+  if (plan_.needed_aovs().test(static_cast<std::size_t>(kernels::Aov::motion))) {
+    // Once for all cameras of the frame.
+    auto next =
+        session.at(scene::frame_time(static_cast<double>(view.frame) + 1.0, plan_.job().fps));
+    if (!next) return next.error();
+    next_ = std::move(*next);
+  }
   frame_ = view.frame;
   return {};
 }
@@ -218,8 +229,9 @@ bool Run::run_view(const View& view, SceneSession& session, render::Renderer& re
   settings.threads = options_.threads;
   settings.tile = options_.tile;
   settings.cancel = &util::interrupt_flag();
-  const util::Timer timer;
   const ImageSize& size = plan_.job().size;
+  if (next_) settings.next = next_frame(session.scene, *camera, *next_, size);
+  const util::Timer timer;
   auto traced = renderer.render(
       scene::make_ray_camera(*camera, static_cast<int>(size.width), static_cast<int>(size.height)),
       settings, *framebuffer);
@@ -299,7 +311,7 @@ Result<void> append(Journal& journal, const ordered_json& line) {
 
 Result<RunSummary> run_plan(const Plan& plan, const RunOptions& options) {
   if (auto made = make_folder(state_folder(plan.folder())); !made) return made.error();
-  auto lock = RunLock::acquire(plan.folder(), options.shard);
+  auto lock = RunLock::acquire(plan.folder(), options.shard, {options.wait_lock, false});
   if (!lock) return lock.error();
   const ordered_json meaning = plan.meaning(options.limits);
   if (options.force) {
@@ -333,8 +345,6 @@ Result<RunSummary> run_plan(const Plan& plan, const RunOptions& options) {
     }
     Run(plan, options, *done, *journal, summary).run();
   }
-  summary.all_views = plan.views();
-  summary.all_done = done->count + summary.standing.done;
   const ordered_json last = {{"kind", "end"},
                              {"seconds", summary.standing.seconds},
                              {"done", summary.standing.done},

@@ -31,7 +31,8 @@ struct Standing {
 struct RunOptions {
   Shard shard;
   bool force = false;
-  unsigned threads = 0;  // that trace, and as many that encode; 0: all cores
+  double wait_lock = 0.0;  // seconds (LockWait)
+  unsigned threads = 0;    // that trace, and as many that encode; 0: all cores
   std::uint32_t tile = 16;
   bool verify = false;
   octree::BuildOptions build;
@@ -51,7 +52,6 @@ struct RunSummary {
   static constexpr std::size_t kMostFailures = 1000;  // kept; the journal has all
 
   Standing standing;
-  std::uint64_t all_views = 0, all_done = 0;  // of the whole job, other shards' included
   std::uint64_t scenes_loaded = 0, broken_lines = 0;
   std::vector<Failure> failures;
   std::optional<util::Error>

@@ -9,6 +9,9 @@ namespace octrace::batch {
 
 namespace {
 
+// NFS 4 gives up the locks of a client after it was silent for 90 s, unless set otherwise.
+constexpr int kWaitLockSeconds = 300;
+
 // #SBATCH lines have rules of quoting of their own: only what needs none goes into them.
 std::string job_name(const std::string& path) {
   const std::size_t slash = path.rfind('/');
@@ -79,8 +82,8 @@ util::Result<std::vector<std::string>> split_words(std::string_view line) {
 std::string slurm_array_script(const SlurmJob& job) {
   std::string more;
   for (const std::string& option : job.options) more += " " + shell_word(option);
-  // A requeued task goes on where its journal ends. Slurm says how many cores of the node are its
-  // own.
+  // A requeued task goes on where its journal ends, once the file server has given up the lock of
+  // the node that died. Slurm says how many cores of the node are its own.
   return fmt::format(
       "#!/bin/sh\n"
       "#SBATCH --job-name={0}\n"
@@ -88,8 +91,8 @@ std::string slurm_array_script(const SlurmJob& job) {
       "#SBATCH --requeue\n"
       "#SBATCH --open-mode=append\n"
       "{2} --shard \"$SLURM_ARRAY_TASK_ID/{1}\" --threads \"${{SLURM_CPUS_ON_NODE:-0}}\" "
-      "--progress none{3}\n",
-      job_name(job.job), job.tasks, command(job), more);
+      "--progress none --wait-lock {3}{4}\n",
+      job_name(job.job), job.tasks, command(job), kWaitLockSeconds, more);
 }
 
 std::string slurm_merge_script(const SlurmJob& job) {
@@ -98,8 +101,8 @@ std::string slurm_merge_script(const SlurmJob& job) {
       "#SBATCH --job-name={}-merge\n"
       "#SBATCH --requeue\n"
       "#SBATCH --open-mode=append\n"
-      "{} --merge\n",
-      job_name(job.job), command(job));
+      "{} --merge --wait-lock {}\n",
+      job_name(job.job), command(job), kWaitLockSeconds);
 }
 
 }  // namespace octrace::batch

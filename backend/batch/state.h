@@ -18,12 +18,21 @@ std::vector<std::string> journals_in(const std::string& output_folder);  // path
 // Makes a folder and those above it. Exit 5.
 util::Result<void> make_folder(const std::string& folder);
 
+// How long to wait for a lock that another process holds: on a network a dead one's stays until the
+// server gives it up.
+struct LockWait {
+  double seconds = 0.0;
+  bool other_shards = false;  // else only for a lock of the same shard
+};
+
 // Held while a shard runs; gone with the process, however it ends.
 class RunLock {
  public:
-  // Exit 5 where another run holds this shard's lock, or one of another division of the job; the
-  // message names it. Where the file system has no locks, a warning.
-  static util::Result<RunLock> acquire(const std::string& output_folder, const Shard& shard);
+  // Exit 5 where another run holds this shard's lock, or one of another division of the job, and
+  // does so for longer than may be waited; the message names it. A task of Slurm does not wait for
+  // another task, only for an earlier run of itself. Where the file system has no locks, a warning.
+  static util::Result<RunLock> acquire(const std::string& output_folder, const Shard& shard,
+                                       const LockWait& wait);
   RunLock(RunLock&& other) noexcept;
   RunLock& operator=(RunLock&&) = delete;
   ~RunLock();

@@ -46,9 +46,10 @@ class BatchCase(unittest.TestCase):
             json.dump(job, file)
         return job
 
-    def start(self, *arguments):
+    def start(self, *arguments, **environment):
         return subprocess.Popen([PROGRAM, "batch", "job.json", *arguments], cwd=self.folder,
-                                stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+                                stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+                                env={**os.environ, **environment})
 
     def run_batch(self, *arguments, code=0):
         process = self.start(*arguments)
@@ -401,6 +402,86 @@ class Failures(BatchCase):
         finally:
             first.kill()
             first.communicate()
+
+
+class Locks(BatchCase):
+    """A process that stands still with its lock is what a dead one on another node looks like, until
+    the file server gives up its lock: the kill is that moment."""
+
+    def stand_still(self, *arguments, **environment):
+        process = self.start(*arguments, **environment)
+        self.addCleanup(lambda: (process.kill(), process.communicate()))
+        while not os.path.exists(self.path("out")) or not self.outputs():
+            time.sleep(0.02)
+        process.send_signal(signal.SIGSTOP)
+        return process
+
+    def read_until(self, process, text):
+        line = process.stderr.readline()
+        while line and text not in line:
+            line = process.stderr.readline()
+        self.assertIn(text, line)
+
+    def big_job(self):
+        self.job(scenes=["builtin:terrain:64"], size=[640, 480], frames="0-9")
+
+    def test_a_requeued_task_waits_for_the_dead_one(self):
+        self.big_job()
+        self.run_batch("--out", "reference")
+        expected = self.outputs("reference/out")
+        task = {"SLURM_JOB_ID": "7", "SLURM_CLUSTER_NAME": "c"}
+        dead = self.stand_still("--shard", "1/2", **task)
+        second = self.start("--shard", "1/2", "--wait-lock", "120", **task)
+        self.read_until(second, "waiting up to 120 s: process %d on " % dead.pid)
+        self.assertIsNone(second.poll())
+        dead.kill()
+        _, err = second.communicate(timeout=120)
+        self.assertEqual(second.returncode, 0, err)
+        self.assertIn("the lock is free after", err)
+        self.run_batch("--shard", "2/2")
+        self.assertEqual(self.outputs(), expected)
+        views = [line["view"] for line in self.journal("1-of-2") if line["kind"] == "view"]
+        self.assertEqual(sorted(views), list(range(30)))  # none twice
+
+    def test_the_wait_ends(self):
+        self.big_job()
+        dead = self.stand_still()
+        _, err = self.run_batch("--wait-lock", "1.5", code=5)
+        self.assertIn("process %d on " % dead.pid, err)
+        self.assertRegex(err, r"\([0-9]+ s waited\)")
+
+    def test_another_run_is_not_waited_for(self):
+        self.big_job()
+        first = self.stand_still("--shard", "1/2", SLURM_JOB_ID="7", SLURM_CLUSTER_NAME="c")
+        for arguments, environment in (
+                (("--shard", "1/2"), {}),
+                (("--shard", "1/2", "--wait-lock", "600"),
+                 {"SLURM_JOB_ID": "8", "SLURM_CLUSTER_NAME": "c"}),
+                (("--shard", "1/3", "--wait-lock", "600"), {})):
+            second = self.start(*arguments, **environment)
+            _, err = second.communicate(timeout=60)
+            self.assertEqual(second.returncode, 5, err)
+            self.assertIn("process %d on " % first.pid, err)
+            self.assertNotIn("waiting", err)
+
+    def test_merging_waits_for_any_shard(self):
+        self.big_job()
+        dead = self.stand_still("--shard", "1/2")
+        merge = self.start("--merge", "--wait-lock", "120", SLURM_JOB_ID="9")
+        self.read_until(merge, "waiting up to 120 s")
+        dead.kill()
+        _, err = merge.communicate(timeout=60)
+        self.assertEqual(merge.returncode, 8, err)
+        self.assertIn("are missing", err)
+
+    def test_a_signal_ends_the_wait(self):
+        self.big_job()
+        self.stand_still()
+        second = self.start("--wait-lock", "600")
+        self.read_until(second, "waiting up to 600 s")
+        second.send_signal(signal.SIGTERM)
+        second.communicate(timeout=60)
+        self.assertEqual(second.returncode, 128 + signal.SIGTERM)
 
 
 class Disks(BatchCase):

@@ -1,9 +1,11 @@
 // --time, --frame, --fps and --animation, as a user meets them.
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "backend/image/image.h"
 #include "tests/cli/driver.h"
@@ -150,6 +152,62 @@ TEST_F(TimeOptions, InfoNamesAnimationsAndTakesATime) {
   const Outcome text = octrace({"info", "hierarchy.gltf"});
   EXPECT_THAT(text.out,
               HasSubstr("animation 0 \"animation 0\": 0 s to 2 s, 6 channels of 3 nodes"));
+}
+
+// Of each view and frame the very file that a render of its own writes; the job goes over the
+// frames with gaps, so that its scene is moved, and not opened, at each.
+TEST_F(TimeOptions, ABatchHasTheMotionOfARender) {
+  write_text(scratch_.path("view.json"),
+             R"({"name": "view", "type": "perspective", "yfov": 0.9, "znear": 0.01,
+                 "matrix": [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0.3, 0.8, 4, 1]})");
+  struct Job {
+    std::string scenes, cameras, animation;
+    std::vector<std::string> names;
+  };
+  const std::vector<Job> jobs = {
+      {R"("hierarchy.gltf", "rotations.gltf", "skin_of_two_sets.gltf", "morphs.gltf")",
+       R"("view.json")",
+       "",
+       {"hierarchy", "rotations", "skin_of_two_sets", "morphs"}},
+      {R"("skin_morph_and_camera.gltf")", R"("eye", "view.json")", "", {"skin_morph_and_camera"}},
+      {R"("morphs.gltf")", R"("view.json")", R"("animation": "none",)", {"morphs"}}};
+  for (const Job& job : jobs) {
+    write_text(scratch_.path("job.json"),
+               R"({"version": 1, "frames": "2-3,7", "fps": 10, "size": [48, 36],
+                   "aovs": ["Z", "motion"], "output": "out/{scene}_{camera}_{frame}_{aov}.npy",)" +
+                   job.animation + R"("scenes": [)" + job.scenes + R"(], "cameras": [)" +
+                   job.cameras + "]}");
+    const Outcome batch = octrace({"batch", "job.json", "--force"});
+    ASSERT_EQ(batch.exit_code, 0) << batch.err;
+    for (const std::string& name : job.names) {
+      const bool eye = name == "skin_morph_and_camera", still = !job.animation.empty();
+      for (const char* camera : eye ? std::vector{"eye", "view"} : std::vector{"view"}) {
+        std::set<std::string> motions;
+        for (const char* frame : {"2", "3", "7"}) {
+          std::vector<std::string> arguments = {
+              "render",   name + ".gltf",
+              "--frame",  frame,
+              "--fps",    "10",
+              "--size",   "48x36",
+              "--camera", std::string(camera) == "eye" ? "eye" : "view.json",
+              "-o",       "Z.npy:Z",
+              "-o",       "motion.npy:motion",
+              "--quiet"};
+          if (still) arguments.insert(arguments.end(), {"--animation", "none"});
+          const Outcome alone = octrace(arguments);
+          ASSERT_EQ(alone.exit_code, 0) << alone.err;
+          for (const char* plane : {"Z", "motion"}) {
+            const std::string file = fmt::format("{}_{}_{}_{}.npy", name, camera, frame, plane);
+            EXPECT_EQ(read_text(scratch_.path("out/" + file)),
+                      read_text(scratch_.path(std::string(plane) + ".npy")))
+                << file;
+          }
+          motions.insert(read_text(scratch_.path("motion.npy")));
+        }
+        EXPECT_EQ(motions.size(), still ? 1u : 3u) << name << " " << camera;
+      }
+    }
+  }
 }
 
 }  // namespace

@@ -83,5 +83,49 @@ TEST(Variant, UnknownOnesAreNamed) {
   EXPECT_EQ(outcome.exit_code, 2);
 }
 
+// The job's variant, and a scene's own; one that is not there fails with its scene alone.
+TEST(Variant, OfABatch) {
+  Scratch scratch;
+  write_scene(scratch.path("v.gltf"));
+  const auto batch = [&](const std::string& members, std::vector<std::string> more = {}) {
+    write_text(scratch.path("job.json"),
+               R"({"version": 1, "size": [64, 48], "aovs": ["mask"], "cameras": [
+                   {"turntable": {"n": 1}}], "output": "out/{scene}.png",)" +
+                   members + "}");
+    Launch launch;
+    launch.folder = scratch.folder();
+    launch.arguments = {"batch", "job.json"};
+    launch.arguments.insert(launch.arguments.end(), more.begin(), more.end());
+    return run(launch);
+  };
+  const std::string scenes = R"("variant": "gone", "scenes": ["v.gltf",
+      {"path": "v.gltf", "name": "plain", "variant": "plain"},
+      {"path": "v.gltf", "name": "second", "variant": 1}])";
+  const Outcome listed = batch(scenes, {"--dry-run"});
+  EXPECT_EQ(listed.out, "out/v.png\nout/plain.png\nout/second.png\n") << listed.err;
+  const Outcome made = batch(scenes);
+  ASSERT_EQ(made.exit_code, 0) << made.err;
+  const auto image = [&](const std::string& name) {
+    return read_text(scratch.path("out/" + name + ".png"));
+  };
+  EXPECT_EQ(image("v"), image("second"));
+  EXPECT_NE(image("v"), image("plain"));
+
+  const Outcome changed = batch(R"("scenes": ["v.gltf",
+      {"path": "v.gltf", "name": "plain", "variant": "plain"},
+      {"path": "v.gltf", "name": "second", "variant": 1}])");
+  EXPECT_EQ(changed.exit_code, 2);
+  EXPECT_THAT(changed.err, HasSubstr("/scenes/0/variant was \"gone\", is gone"));
+
+  const Outcome unknown = batch(R"("scenes": [{"path": "v.gltf", "name": "x", "variant": "blue"},
+      "v.gltf", {"path": "builtin:paper", "variant": 0}])",
+                                {"--force"});
+  EXPECT_EQ(unknown.exit_code, 8);
+  EXPECT_THAT(unknown.err, HasSubstr("scene 0 (x), 1 views: "));
+  EXPECT_THAT(unknown.err, HasSubstr("there is no such variant; the file has 2: 0 \"plain\""));
+  EXPECT_THAT(unknown.err, HasSubstr("builtin:paper has no variants"));
+  EXPECT_EQ(image("v"), image("plain"));
+}
+
 }  // namespace
 }  // namespace octrace::test
