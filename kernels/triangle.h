@@ -29,29 +29,24 @@ struct TriangleRay {
   Vec3 row_x, row_y, row_z;
 };
 
+// The direction's largest axis k becomes z. Chosen before anything is divided, so that the lanes of
+// a warp divide together.
 OCTRACE_HD OCTRACE_FORCE_INLINE TriangleRay make_triangle_ray(const Vec3& d) {
   const float ax = abs_of(d.x), ay = abs_of(d.y), az = abs_of(d.z);
-  TriangleRay ray;
-  bool negative;
-  if (az >= ax && az >= ay) {
-    ray = {Vec3(1.0f, 0.0f, -div_rn(d.x, d.z)), Vec3(0.0f, 1.0f, -div_rn(d.y, d.z)),
-           Vec3(0.0f, 0.0f, reciprocal_rn(d.z))};
-    negative = d.z < 0.0f;
-  } else if (ay >= ax) {
-    ray = {Vec3(0.0f, -div_rn(d.z, d.y), 1.0f), Vec3(1.0f, -div_rn(d.x, d.y), 0.0f),
-           Vec3(0.0f, reciprocal_rn(d.y), 0.0f)};
-    negative = d.y < 0.0f;
-  } else {
-    ray = {Vec3(-div_rn(d.y, d.x), 1.0f, 0.0f), Vec3(-div_rn(d.z, d.x), 0.0f, 1.0f),
-           Vec3(reciprocal_rn(d.x), 0.0f, 0.0f)};
-    negative = d.x < 0.0f;
-  }
-  if (negative) {  // keeps the winding: a front face has a positive determinant
-    const Vec3 row = ray.row_x;
-    ray.row_x = ray.row_y;
-    ray.row_y = row;
-  }
-  return ray;
+  const bool is_z = az >= ax && az >= ay;
+  const bool is_y = !is_z && ay >= ax;
+  const auto pick = [&](float if_x, float if_y, float if_z) {
+    return is_z ? if_z : is_y ? if_y : if_x;
+  };
+  const float dk = pick(d.x, d.y, d.z);
+  const float i = -div_rn(pick(d.y, d.z, d.x), dk);
+  const float j = -div_rn(pick(d.z, d.x, d.y), dk);
+  const float r = reciprocal_rn(dk);
+  const Vec3 x(pick(i, 0.0f, 1.0f), pick(1.0f, i, 0.0f), pick(0.0f, 1.0f, i));
+  const Vec3 y(pick(j, 1.0f, 0.0f), pick(0.0f, j, 1.0f), pick(1.0f, 0.0f, j));
+  const Vec3 z(pick(r, 0.0f, 0.0f), pick(0.0f, r, 0.0f), pick(0.0f, 0.0f, r));
+  // Swapped rows keep the winding: a front face has a positive determinant.
+  return dk < 0.0f ? TriangleRay{y, x, z} : TriangleRay{x, y, z};
 }
 
 OCTRACE_HD OCTRACE_FORCE_INLINE float shear(const Vec3& row, const Vec3& v) {

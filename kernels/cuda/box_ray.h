@@ -1,31 +1,50 @@
-// The 8-child box test for one thread, counted in instructions of the integer and comparison unit,
-// which has half the rate of the multiply-add unit and is what a walk is bound by (Ylitie, Karras
-// and Laine 2017 describe the node; the ways to save below are of this file).
+// The 8-child box test for one thread, two children an instruction in half precision, counted in
+// instructions of the integer and comparison unit, which has half the rate of the multiply-add unit
+// (Ylitie, Karras and Laine 2017 describe the node; the ways to save below are of this file).
 //
-// - A byte q becomes the float 2^15 + q by one byte permute; the 2^15 is taken off with the plane's
-//   constant. That rounds by 2^-9 of a step at most, for which kBiasError leaves 2^-8.
-// - Distances are compared as integers, three at a time (Hopper's VIMNMX3). Floats order like
-//   integers unless both are negative; entries count from 0 on, as tmin does, and an exit that is
-//   negative at all is below that.
-// - A child is missed where exit - entry has its sign bit set; the bits are shifted together.
+// - A byte q between zero bytes is the half q * 2^-24, a denormal, exact and full speed. So a
+// plane's
+//   distance is one fused multiply-add of two children's bytes.
+// - Distances are counted from where the ray enters the node, t0, in units that make the steepest
+//   axis' step kSteepest: t' = (t - t0) * unit. Halves have 11 bits, and a node has 8.
+// - Distances are compared as integers, three at a time (Hopper's VIMNMX3). Halves order like
+//   integers unless both are negative; entries count from t0 on, and an exit that is negative at
+//   all is below that.
 // - The padding of kernels/box.h is taken once a ray, from the root's box, in place of once a node.
 //   It can only be wider, so the test stays conservative.
+//
+// Why it is conservative. Let h = t' of a point of the ray inside a child's padded box, with
+// t0 <= t <= tmax. Rounding is monotone: where the exact fused sum of a near plane is at most h and
+// that of a far plane at least h, their halves are on either side of h's half, and so is tmax's.
+// What is left is the rounding of step and offset to halves. The step is off by 2^-11 of itself,
+// which makes at most 255 * 2^-11 steps of a plane. The offset b, the distance of plane 0, is off
+// by 2^-11 of |b|, and |b| is at most 255 steps and twice the margin, for the ray is between the
+// node's planes at h. Together below 1/4 of a step: kMargin leaves 5/16. Offsets that are denormal
+// are off by 2^-25, for which kHalfError leaves 2^-24. Singles are off by at most 2^-21 of the
+// distance that the padding is 2^-19 of, of which the triangles' own boxes take 2^-20.
 #pragma once
+
+#include <cuda_fp16.h>
 
 #include "kernels/traverse.h"
 
 namespace octrace::kernels::cuda {
 
-inline constexpr float kByteBias = 32768.0f;
-inline constexpr std::uint32_t kByteBiasBits = 0x47000000u;
-inline constexpr float kBiasError = 1.0f / 256;  // their sum is a float
+inline constexpr float kSteepest = 60000.0f;             // of at most 65504, a half's largest
+inline constexpr float kByteUnit = 1.0f / (1 << 24);     // what a byte of 1 is as a half
+inline constexpr float kHalfError = 1.0f / (1 << 24);    // of t'
+inline constexpr float kMargin = 5.0f / 16 * kByteUnit;  // in bytes
+
+// How much steeper one axis may be than another. Beyond it, half precision would not tell apart
+// distances along the other: an axis that is nearly perpendicular to the ray counts as this steep,
+// and boxes are padded by what that moves the ray in the scene's box.
+inline constexpr float kSteeper = 32768.0f;
 
 struct BoxRay {
   Vec3 origin;
   Vec3 inverse;
-  Vec3 widen;            // the padding in units of t
-  Vec3 bias;             // -2^15, and 2^-8 towards the ray's origin
-  std::uint32_t octant;  // bit a: direction is negative along axis a
+  Vec3 entered;   // the byte of the plane where the ray enters a node's frame: 0, or 255 as a half
+  float padding;  // of boxes, as a distance
 };
 
 struct ChildMask {
@@ -51,91 +70,140 @@ __device__ OCTRACE_FORCE_INLINE BoxRay make_box_ray(const SlabRay& ray, const No
     const float u = fma_rn(255.0f, scale_of(head.w, axis), l);
     largest = fmaxf(largest, fmaxf(fabsf(l), fabsf(u)));
   }
-  const float padding = largest * kChildPadding;
-  return {ray.origin, ray.inverse,
-          Vec3(padding * fabsf(ray.inverse.x), padding * fabsf(ray.inverse.y),
-               padding * fabsf(ray.inverse.z)),
-          Vec3(-kByteBias - copysignf(kBiasError, ray.inverse.x),
-               -kByteBias - copysignf(kBiasError, ray.inverse.y),
-               -kByteBias - copysignf(kBiasError, ray.inverse.z)),
-          ray.octant};
+  const float limit =
+      kSteeper * fminf(fminf(fabsf(ray.inverse.x), fabsf(ray.inverse.y)), fabsf(ray.inverse.z));
+  BoxRay box_ray;
+  box_ray.origin = ray.origin;
+  bool steep = false;
+#pragma unroll
+  for (int axis = 0; axis < 3; ++axis) {
+    const float inverse = ray.inverse[axis];
+    steep |= fabsf(inverse) > limit;
+    box_ray.inverse[axis] = copysignf(fminf(fabsf(inverse), limit), inverse);
+    box_ray.entered[axis] = inverse < 0.0f ? 255.0f * kByteUnit : 0.0f;
+  }
+  // While the ray is in the scene's box, it goes at most `largest` along its main axis, so at most
+  // that over kSteeper along one that counts as steep.
+  box_ray.padding = largest * (steep ? kChildPadding + 1.0f / kSteeper : kChildPadding);
+  return box_ray;
 }
 
 class ChildTest {
  public:
   // The node's children that the ray may meet between 0 and tmax.
-  // byte_bias: kByteBiasBits. Were its value known, the compiler would put it into the permutes and
-  // move their selectors into registers, 40 instructions more.
   __device__ OCTRACE_FORCE_INLINE static ChildMask test(const Node& node, const BoxRay& ray,
-                                                        float tmax, std::uint32_t byte_bias) {
+                                                        float tmax) {
     const uint4* p = reinterpret_cast<const uint4*>(&node);
     const uint4 n0 = __ldg(p), n1 = __ldg(p + 1), n2 = __ldg(p + 2), n3 = __ldg(p + 3),
                 n4 = __ldg(p + 4);
-    const Axis x = axis(__uint_as_float(n0.x), scale_of(n0.w, 0), ray.origin.x, ray.inverse.x,
-                        ray.widen.x, ray.bias.x);
-    const Axis y = axis(__uint_as_float(n0.y), scale_of(n0.w, 1), ray.origin.y, ray.inverse.y,
-                        ray.widen.y, ray.bias.y);
-    const Axis z = axis(__uint_as_float(n0.z), scale_of(n0.w, 2), ray.origin.z, ray.inverse.z,
-                        ray.widen.z, ray.bias.z);
-    const bool nx = ray.octant & 1, ny = ray.octant & 2, nz = ray.octant & 4;
-    std::uint32_t missed = 0;
-    half(x, y, z, nx ? n3.w : n2.y, ny ? n4.y : n2.w, nz ? n4.w : n3.y, nx ? n2.y : n3.w,
-         ny ? n2.w : n4.y, nz ? n3.y : n4.w, tmax, byte_bias, &missed);
-    half(x, y, z, nx ? n3.z : n2.x, ny ? n4.x : n2.z, nz ? n4.z : n3.x, nx ? n2.x : n3.z,
-         ny ? n2.z : n4.x, nz ? n3.x : n4.z, tmax, byte_bias, &missed);
-    return {~missed & 0xffu, n0.w >> 24, n1.x, n1.y, {n1.z, n1.w}};
+    // Exponents are -60 or more and below 100, so no byte carries into the next: they become those
+    // of floats 2^24 times as large.
+    const std::uint32_t exponents = (n0.w ^ 0x808080u) + 0x171717u;
+    const Plane x = plane(__uint_as_float(n0.x), exponents << 23, ray.origin.x, ray.inverse.x,
+                          ray.entered.x, ray.padding);
+    const Plane y = plane(__uint_as_float(n0.y), exponents << 15, ray.origin.y, ray.inverse.y,
+                          ray.entered.y, ray.padding);
+    const Plane z = plane(__uint_as_float(n0.z), exponents << 7, ray.origin.z, ray.inverse.z,
+                          ray.entered.z, ray.padding);
+    const float t0 = __int_as_float(__vimax3_s32_relu(
+        __float_as_int(x.entry), __float_as_int(y.entry), __float_as_int(z.entry)));
+    // The summand keeps it finite where a node is a point.
+    const float unit = reciprocal(fma_rn(fmaxf(fmaxf(fabsf(x.step), fabsf(y.step)), fabsf(z.step)),
+                                         1.0f / kSteepest, 1e-35f));
+    const float near0 = fma_rn(-t0, unit, -kHalfError), far0 = fma_rn(-t0, unit, kHalfError);
+    const __half2 near_x = halves(x.step * unit, fma_rn(x.near, unit, near0));
+    const __half2 near_y = halves(y.step * unit, fma_rn(y.near, unit, near0));
+    const __half2 near_z = halves(z.step * unit, fma_rn(z.near, unit, near0));
+    const __half2 far_xy = halves(fma_rn(x.far, unit, far0), fma_rn(y.far, unit, far0));
+    const __half2 far_z_end = halves(fma_rn(z.far, unit, far0), fma_rn(tmax, unit, far0));
+    const Frame frame = {{__low2half2(near_x), __low2half2(near_y), __low2half2(near_z)},
+                         {__high2half2(near_x), __high2half2(near_y), __high2half2(near_z)},
+                         {__low2half2(far_xy), __high2half2(far_xy), __low2half2(far_z_end)},
+                         bits_of(__high2half2(far_z_end))};
+    const bool nx = ray.inverse.x < 0.0f, ny = ray.inverse.y < 0.0f, nz = ray.inverse.z < 0.0f;
+    const Planes low = {nx ? n3.z : n2.x, ny ? n4.x : n2.z, nz ? n4.z : n3.x,
+                        nx ? n2.x : n3.z, ny ? n2.z : n4.x, nz ? n3.x : n4.z};
+    const Planes high = {nx ? n3.w : n2.y, ny ? n4.y : n2.w, nz ? n4.w : n3.y,
+                         nx ? n2.y : n3.w, ny ? n2.w : n4.y, nz ? n3.y : n4.w};
+    // Slots 0 and 4 are at bits 0 and 4 of the lower halves, 2 and 6 at theirs of the upper ones.
+    const std::uint32_t hit =
+        (meets(frame, even(low)) & 0x00040001u) | (meets(frame, odd(low)) & 0x00080002u) |
+        (meets(frame, even(high)) & 0x00400010u) | (meets(frame, odd(high)) & 0x00800020u);
+    return {(hit | hit >> 16) & 0xffu, n0.w >> 24, n1.x, n1.y, {n1.z, n1.w}};
   }
 
  private:
-  struct Axis {
-    float step, near, far;
+  // One axis of a node: where the plane of byte 0 is met, early and late by padding and margin; the
+  // step to byte 2^24; where the ray enters the frame.
+  struct Plane {
+    float step, near, far, entry;
+  };
+  // The same by axis, each as a pair of equal halves; tmax's bits.
+  struct Frame {
+    __half2 step[3], near[3], far[3];
+    std::uint32_t end;
+  };
+  // Bytes of the planes where boxes are entered and left.
+  struct Planes {
+    std::uint32_t near_x, near_y, near_z, far_x, far_y, far_z;
   };
 
-  __device__ OCTRACE_FORCE_INLINE static Axis axis(float origin, float scale, float ray_origin,
-                                                   float inverse, float widen, float bias) {
+  __device__ OCTRACE_FORCE_INLINE static Plane plane(float origin, std::uint32_t scale_bits,
+                                                     float ray_origin, float inverse, float entered,
+                                                     float padding) {
+    const float scale = __uint_as_float(scale_bits & 0x7f800000u);
     const float l = origin - ray_origin;
-    const float step = scale * inverse;
-    return {step, fma_rn(step, bias, fma_rn(l, inverse, -widen)),
-            fma_rn(step, -2.0f * kByteBias - bias, fma_rn(l, inverse, widen))};
+    const float widen = fma_rn(scale, kMargin, padding) * fabsf(inverse);
+    Plane plane;
+    plane.step = scale * inverse;
+    plane.near = fma_rn(l, inverse, -widen);
+    plane.far = fma_rn(l, inverse, widen);
+    plane.entry = fma_rn(plane.step, entered, plane.near);
+    return plane;
   }
 
-  template <int kByte>
-  __device__ OCTRACE_FORCE_INLINE static float biased(std::uint32_t bytes,
-                                                      std::uint32_t byte_bias) {
-    return __uint_as_float(__byte_perm(bytes, byte_bias, 0x7404 | kByte << 4));
+  __device__ OCTRACE_FORCE_INLINE static float reciprocal(float a) {
+    float result;
+    asm("rcp.approx.ftz.f32 %0, %1;" : "=f"(result) : "f"(a));
+    return result;
   }
 
-  template <int kByte>
-  __device__ OCTRACE_FORCE_INLINE static void child(const Axis& x, const Axis& y, const Axis& z,
-                                                    std::uint32_t near_x, std::uint32_t near_y,
-                                                    std::uint32_t near_z, std::uint32_t far_x,
-                                                    std::uint32_t far_y, std::uint32_t far_z,
-                                                    float tmax, std::uint32_t byte_bias,
-                                                    std::uint32_t* missed) {
-    const int entry =
-        __vimax3_s32_relu(__float_as_int(fma_rn(biased<kByte>(near_x, byte_bias), x.step, x.near)),
-                          __float_as_int(fma_rn(biased<kByte>(near_y, byte_bias), y.step, y.near)),
-                          __float_as_int(fma_rn(biased<kByte>(near_z, byte_bias), z.step, z.near)));
-    const int exit =
-        min(__vimin3_s32(__float_as_int(fma_rn(biased<kByte>(far_x, byte_bias), x.step, x.far)),
-                         __float_as_int(fma_rn(biased<kByte>(far_y, byte_bias), y.step, y.far)),
-                         __float_as_int(fma_rn(biased<kByte>(far_z, byte_bias), z.step, z.far))),
-            __float_as_int(tmax));
-    *missed =
-        __funnelshift_l(__float_as_uint(__int_as_float(exit) - __int_as_float(entry)), *missed, 1);
+  __device__ OCTRACE_FORCE_INLINE static __half2 halves(float low, float high) {
+    return __floats2half2_rn(low, high);
+  }
+  __device__ OCTRACE_FORCE_INLINE static std::uint32_t bits_of(const __half2& pair) {
+    return reinterpret_cast<const std::uint32_t&>(pair);
+  }
+  __device__ OCTRACE_FORCE_INLINE static std::uint32_t distance(std::uint32_t bytes,
+                                                                const __half2& step,
+                                                                const __half2& base) {
+    return bits_of(__hfma2(reinterpret_cast<const __half2&>(bytes), step, base));
   }
 
-  // Four children, from the highest slot down.
-  __device__ OCTRACE_FORCE_INLINE static void half(const Axis& x, const Axis& y, const Axis& z,
-                                                   std::uint32_t near_x, std::uint32_t near_y,
-                                                   std::uint32_t near_z, std::uint32_t far_x,
-                                                   std::uint32_t far_y, std::uint32_t far_z,
-                                                   float tmax, std::uint32_t byte_bias,
-                                                   std::uint32_t* missed) {
-    child<3>(x, y, z, near_x, near_y, near_z, far_x, far_y, far_z, tmax, byte_bias, missed);
-    child<2>(x, y, z, near_x, near_y, near_z, far_x, far_y, far_z, tmax, byte_bias, missed);
-    child<1>(x, y, z, near_x, near_y, near_z, far_x, far_y, far_z, tmax, byte_bias, missed);
-    child<0>(x, y, z, near_x, near_y, near_z, far_x, far_y, far_z, tmax, byte_bias, missed);
+  // 0xffff in the half of each child of two that the ray meets.
+  __device__ OCTRACE_FORCE_INLINE static std::uint32_t meets(const Frame& f, const Planes& p) {
+    const std::uint32_t entry = __vimax3_s16x2_relu(distance(p.near_x, f.step[0], f.near[0]),
+                                                    distance(p.near_y, f.step[1], f.near[1]),
+                                                    distance(p.near_z, f.step[2], f.near[2]));
+    const std::uint32_t exit = __vmins2(__vimin3_s16x2(distance(p.far_x, f.step[0], f.far[0]),
+                                                       distance(p.far_y, f.step[1], f.far[1]),
+                                                       distance(p.far_z, f.step[2], f.far[2])),
+                                        f.end);
+    return __hle2_mask(reinterpret_cast<const __half2&>(entry),
+                       reinterpret_cast<const __half2&>(exit));
+  }
+
+  // Of four children's bytes, the first and the third, or the second and the fourth, as halves.
+  __device__ OCTRACE_FORCE_INLINE static Planes even(const Planes& p) {
+    constexpr std::uint32_t mask = 0x00ff00ffu;
+    return {p.near_x & mask, p.near_y & mask, p.near_z & mask,
+            p.far_x & mask,  p.far_y & mask,  p.far_z & mask};
+  }
+  __device__ OCTRACE_FORCE_INLINE static Planes odd(const Planes& p) {
+    constexpr std::uint32_t bytes = 0x4341u;
+    return {__byte_perm(p.near_x, 0, bytes), __byte_perm(p.near_y, 0, bytes),
+            __byte_perm(p.near_z, 0, bytes), __byte_perm(p.far_x, 0, bytes),
+            __byte_perm(p.far_y, 0, bytes),  __byte_perm(p.far_z, 0, bytes)};
   }
 };
 

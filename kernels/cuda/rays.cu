@@ -10,9 +10,14 @@ namespace octrace::kernels::cuda {
 namespace {
 
 constexpr unsigned kBlock = 128;
-constexpr unsigned kBlocks = 7;  // a multiprocessor holds
+// Blocks that a multiprocessor holds: any-hit queries need fewer registers.
+template <bool kAnyHit>
+constexpr unsigned kBlocks = kAnyHit ? 8 : 7;
 // Live lanes below which a warp refills.
 constexpr int kRefillBelow = 20;
+
+// How many rays ahead of its own a lane asks for.
+constexpr std::uint64_t kAhead = 32768;
 
 struct RayBuffer {
   static constexpr bool kAlpha = false;
@@ -26,6 +31,12 @@ struct RayBuffer {
     const float4 a = __ldg(p), b = __ldg(p + 1);
     return {Vec3(a.x, a.y, a.z), a.w, Vec3(b.x, b.y, b.z), b.w};
   }
+  // The rays that this warp or another will load next come from memory meanwhile.
+  __device__ void prefetch(std::uint64_t index) const {
+    if (index + kAhead < size) {
+      asm volatile("prefetch.global.L2 [%0];" : : "l"(rays + index + kAhead));
+    }
+  }
   __device__ void store(std::uint64_t index, const Hit& hit) const {
     reinterpret_cast<float4*>(hits)[index] =
         make_float4(hit.t, hit.u, hit.v, __uint_as_float(hit.triangle));
@@ -33,7 +44,7 @@ struct RayBuffer {
 };
 
 template <bool kAnyHit>
-__global__ void __launch_bounds__(kBlock, kBlocks)
+__global__ void __launch_bounds__(kBlock, kBlocks<kAnyHit>)
     rays_kernel(const __grid_constant__ SceneView scene,
                 const __grid_constant__ RenderParams params, const RayBuffer rays, Report* report) {
   __shared__ BlockShared block;

@@ -27,11 +27,9 @@ inline constexpr unsigned kAllLanes = 0xffffffffu;
 // What the warps of a block share.
 struct BlockShared {
   std::uint8_t order[8][256];  // [octant][mask]: bit s of mask at bit s ^ octant ^ 7
-  std::uint32_t byte_bias;     // kByteBiasBits, which the compiler may not know: see box_ray.h
 
   // By all threads of the block; a barrier must follow.
   __device__ void fill() {
-    if (threadIdx.x == 0) byte_bias = kByteBiasBits;
     for (unsigned i = threadIdx.x; i < 8 * 256; i += blockDim.x) {
       const unsigned octant = i / 256, mask = i % 256;
       unsigned ordered = 0;
@@ -104,7 +102,14 @@ __device__ OCTRACE_FORCE_INLINE std::uint32_t triangle_bits(std::uint32_t meta) 
 }
 
 __device__ OCTRACE_FORCE_INLINE unsigned count_triangles(const uint4& record) {
-  return __popc(triangle_bits(record.y)) + __popc(triangle_bits(record.z));
+  return __popc(triangle_bits(record.y) | triangle_bits(record.z) >> 3);
+}
+
+// A value that is kept in a register: the compiler would rather read special registers again in
+// each node step, and wait for them.
+__device__ OCTRACE_FORCE_INLINE std::uint32_t kept(std::uint32_t value) {
+  asm volatile("" : "+r"(value));
+  return value;
 }
 
 // The k-th triangle of a record.
@@ -222,8 +227,14 @@ template <bool kAnyHit, int kRefill, class Source>
 __device__ OCTRACE_FORCE_INLINE void trace_rays(const SceneView& scene, const RenderParams& params,
                                                 const Source& source, WarpShared& shared,
                                                 const BlockShared& block, Report* report) {
-  const unsigned lane = threadIdx.x % kWarp;
+  const unsigned lane = kept(threadIdx.x % kWarp);
+  const std::uint32_t queue_at =
+      kept(static_cast<std::uint32_t>(__cvta_generic_to_shared(shared.queue)));
+  const std::uint32_t order_base =
+      static_cast<std::uint32_t>(__cvta_generic_to_shared(&block.order[0][0]));
+  std::uint32_t order_at = 0;
   BoxRay ray;
+  std::uint32_t octant = 0;  // bit a: the ray's direction is negative along axis a
   float tmax = 0.0f;
   WalkStack stack;
   WalkGroup group{0, 0};
@@ -231,7 +242,6 @@ __device__ OCTRACE_FORCE_INLINE void trace_rays(const SceneView& scene, const Re
   std::uint32_t budget = 0;
   bool live = false, holds = false, more = true;
   Queue queue;
-  const std::uint32_t byte_bias = block.byte_bias;
   const auto fail = [&](TraceStatus status) {
     report_failure(report, status, static_cast<std::uint32_t>(shared.index[lane]), 0);
     live = false;
@@ -268,13 +278,16 @@ __device__ OCTRACE_FORCE_INLINE void trace_rays(const SceneView& scene, const Re
       }
       if (!holds && taken < source.count()) {
         shared.index[lane] = taken;
+        source.prefetch(taken);
         const Ray from = source.load(taken);
         const SlabRay slab_ray = make_slab_ray(from);
         publish(shared, lane, from, slab_ray);
         if (!scene.octree.nodes.empty()) ray = make_box_ray(slab_ray, scene.octree.nodes.data);
+        octant = slab_ray.octant;
+        order_at = kept(order_base + 256 * octant);
         tmax = from.tmax;
         // The root, as the child in slot 0 of nothing.
-        group = {0, (1u << (24 + (ray.octant ^ 7u))) | 1u};
+        group = {0, (1u << (24 + (octant ^ 7u))) | 1u};
         depth = 0;
         budget = static_cast<std::uint32_t>(scene.octree.nodes.size) + 1;
         holds = true;
@@ -289,10 +302,10 @@ __device__ OCTRACE_FORCE_INLINE void trace_rays(const SceneView& scene, const Re
       uint4 found = make_uint4(0, 0, 0, lane);
       if (live) {
         const int bit = highest_bit(group.pending);
-        const std::uint32_t slot = (static_cast<std::uint32_t>(bit) ^ ray.octant ^ 7u) & 7u;
+        const std::uint32_t slot = (static_cast<std::uint32_t>(bit) ^ octant ^ 7u) & 7u;
         const std::uint32_t before = group.pending & 0xffu & ((1u << slot) - 1u);
-        const ChildMask children = ChildTest::test(
-            scene.octree.nodes[group.first_child + count_bits(before)], ray, tmax, byte_bias);
+        const ChildMask children =
+            ChildTest::test(scene.octree.nodes[group.first_child + count_bits(before)], ray, tmax);
         group.pending &= ~(1u << bit);
         const std::uint32_t inner = children.hit & children.inner_mask;
         if (inner != 0) {
@@ -303,9 +316,9 @@ __device__ OCTRACE_FORCE_INLINE void trace_rays(const SceneView& scene, const Re
               stack[depth++] = group;
             }
           }
-          group = {children.first_child, static_cast<std::uint32_t>(block.order[ray.octant][inner])
-                                                 << 24 |
-                                             children.inner_mask};
+          std::uint32_t ordered;
+          asm volatile("ld.shared.u8 %0, [%1];" : "=r"(ordered) : "r"(order_at + inner));
+          group = {children.first_child, ordered << 24 | children.inner_mask};
         } else if (!(group.pending & kInnerBits)) {
           if (depth == 0) {
             live = false;
@@ -322,7 +335,12 @@ __device__ OCTRACE_FORCE_INLINE void trace_rays(const SceneView& scene, const Re
       const unsigned finders = __ballot_sync(kAllLanes, (found.y | found.z) != 0);
       if (finders != 0) {
         if ((found.y | found.z) != 0) {
-          shared.queue[(queue.first + queue.records + rank(finders, lane)) % (2 * kWarp)] = found;
+          const unsigned at = (queue.first + queue.records + rank(finders, lane)) % (2 * kWarp);
+          asm volatile("st.shared.v4.u32 [%0], {%1, %2, %3, %4};"
+                       :
+                       : "r"(queue_at + at * 16), "r"(found.x), "r"(found.y), "r"(found.z),
+                         "r"(found.w)
+                       : "memory");
         }
         queue.records += __popc(finders);
         queue.pairs += reduce_add(count_triangles(found));

@@ -191,7 +191,7 @@ Ray random_ray(const Mesh& mesh, const octree::Octree& octree, std::mt19937_64& 
   const float reach = std::exp2(uniform(random, -3.0f, 4.0f));
   Vec3 origin = target + in_cube(random, reach);
   Vec3 direction = target - origin;
-  switch (pick(6)) {
+  switch (pick(7)) {
     case 0: {  // along an axis, exactly
       const int axis = static_cast<int>(pick(3));
       direction = Vec3(0.0f);
@@ -213,6 +213,15 @@ Ray random_ray(const Mesh& mesh, const octree::Octree& octree, std::mt19937_64& 
       origin = target;
       direction = in_cube(random, 1.0f);
       break;
+    case 3: {  // nearly along an axis, or nearly in a plane of two
+      const int axis = static_cast<int>(pick(3));
+      direction[axis] = std::copysign(reach, direction[axis]);
+      for (int other = 0; other < 3; ++other) {
+        if (other != axis) direction[other] *= std::exp2(-uniform(random, 0.0f, 40.0f));
+      }
+      origin = target - direction;
+      break;
+    }
     default:
       break;
   }
