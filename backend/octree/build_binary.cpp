@@ -17,6 +17,7 @@
 #include "backend/octree/builders.h"
 #include "backend/octree/object_split.h"
 #include "backend/octree/spatial_split.h"
+#include "backend/util/huge_pages.h"
 
 namespace octrace::octree {
 
@@ -35,7 +36,6 @@ struct Range {
 struct Chosen {
   ObjectSplit object;
   SpatialSplit spatial;
-  bool by_rank() const { return object.axis < 0 && spatial.axis < 0; }
 };
 
 // Where a reference goes: bit 0: to the lower side; bit 1: to the upper one.
@@ -51,12 +51,12 @@ class BinaryBuilder {
     const auto room = static_cast<std::uint32_t>(
         std::min<double>(double{options_.duplicates} * count, 0x7fffffff - double(count)));
     const std::uint64_t most = std::uint64_t{count} + room;
-    references_[0] = std::make_unique_for_overwrite<Reference[]>(most);
+    references_[0] = large_array<Reference>(most);
     if (count > kSubtree || room > 0) {
-      references_[1] = std::make_unique_for_overwrite<Reference[]>(most);
+      references_[1] = large_array<Reference>(most);
     }
     tree_.size = 2 * most;
-    tree_.nodes = std::make_unique_for_overwrite<BinaryNode[]>(tree_.size);
+    tree_.nodes = large_array<BinaryNode>(tree_.size);
     tbb::parallel_for(tbb::blocked_range<std::uint32_t>(0, count, kBlock), [&](const auto& r) {
       for (std::uint32_t i = r.begin(); i < r.end(); ++i) {
         const Box box = triangle_box(input_, i);
@@ -73,6 +73,12 @@ class BinaryBuilder {
   }
 
  private:
+  template <class T>
+  static std::unique_ptr<T[]> large_array(std::uint64_t size) {
+    auto array = std::make_unique_for_overwrite<T[]>(size);
+    util::prefer_huge_pages(array.get(), size * sizeof(T));
+    return array;
+  }
   Bounds8 bounds_of(const Reference* references, std::uint32_t count) const {
     if (count <= 2 * kBlock) return splitter_.bounds(references, count);
     return tbb::parallel_reduce(
@@ -104,28 +110,21 @@ class BinaryBuilder {
                          options_.bins, std::max(options_.sah_depth - depth, 0)});
       return;
     }
-    const Chosen chosen = choose(range, references, bounds, depth);
-    Range lower, upper;
-    if (chosen.by_rank()) {
-      const std::uint32_t half = split_by_rank(references, range.count, bounds);
-      share_out(range, half, range.count - half, lower, upper);
-      Reference* to = references_[1 - array].get();
-      std::copy_n(references, half, to + lower.first);
-      std::copy_n(references + half, range.count - half, to + upper.first);
-    } else {
-      scatter(range, references, bounds, chosen, references_[1 - array].get(), lower, upper);
-    }
+    Sides sides;
+    divide(range, references, bounds, choose(range, references, bounds, depth),
+           references_[1 - array].get(), sides);
     write_node(tree_.nodes[root], bounds, range.pair, range.count);
-    const auto descend = [&](const Range& side, std::uint32_t index) {
-      const Reference* moved = references_[1 - array].get() + side.first;
-      build(side, index, bounds_of(moved, side.count), 1 - array, depth + 1);
+    const auto lower = [&] {
+      build(sides.lower, 2 * range.pair, sides.lower_bounds, 1 - array, depth + 1);
+    };
+    const auto upper = [&] {
+      build(sides.upper, 2 * range.pair + 1, sides.upper_bounds, 1 - array, depth + 1);
     };
     if (range.count <= kSubtree) {
-      descend(lower, 2 * range.pair);
-      descend(upper, 2 * range.pair + 1);
+      lower();
+      upper();
     } else {
-      tbb::parallel_invoke([&] { descend(lower, 2 * range.pair); },
-                           [&] { descend(upper, 2 * range.pair + 1); });
+      tbb::parallel_invoke(lower, upper);
     }
   }
 
@@ -186,14 +185,9 @@ class BinaryBuilder {
         });
   }
 
-  static Side side_of(const Reference& reference, const Chosen& chosen, const Binning& binning) {
-    if (chosen.spatial.axis < 0) {
-      const int bin = binning.bin(reference, chosen.object.axis);
-      return bin < chosen.object.bin ? kLower : kUpper;
-    }
-    const int axis = chosen.spatial.axis;
-    if (reference.upper(axis) <= chosen.spatial.plane) return kLower;
-    if (reference.lower[axis] >= chosen.spatial.plane) return kUpper;
+  static Side side_of(const Reference& reference, const SpatialSplit& split) {
+    if (reference.upper(split.axis) <= split.plane) return kLower;
+    if (reference.lower[split.axis] >= split.plane) return kUpper;
     return kBoth;
   }
   // Where a reference that is not cut goes.
@@ -213,57 +207,49 @@ class BinaryBuilder {
              range.pair + lower_count + lower_room};
   }
 
+  struct Sides {
+    Range lower, upper;
+    Bounds8 lower_bounds, upper_bounds;
+  };
+
+  // Moves the references to their sides of `to`.
+  void divide(const Range& range, Reference* from, const Bounds8& bounds, const Chosen& chosen,
+              Reference* to, Sides& sides) const {
+    const Binning binning(bounds, options_.bins);
+    if (chosen.spatial.axis >= 0 && cut_all(range, from, chosen.spatial, to, sides)) {
+      sides.lower_bounds = bounds_of(to + sides.lower.first, sides.lower.count);
+      sides.upper_bounds = bounds_of(to + sides.upper.first, sides.upper.count);
+    } else if (chosen.object.axis >= 0) {
+      scatter(range, from, chosen.object, binning, to, sides);
+    } else {
+      const std::uint32_t half = split_by_rank(from, range.count, bounds);
+      share_out(range, half, range.count - half, sides.lower, sides.upper);
+      std::copy_n(from, half, to + sides.lower.first);
+      std::copy_n(from + half, range.count - half, to + sides.upper.first);
+      sides.lower_bounds = bounds_of(to + sides.lower.first, sides.lower.count);
+      sides.upper_bounds = bounds_of(to + sides.upper.first, sides.upper.count);
+    }
+  }
+
   struct Counts {
     std::uint32_t lower = 0, upper = 0;
   };
 
-  void scatter(const Range& range, const Reference* from, const Bounds8& bounds,
-               const Chosen& wanted, Reference* to, Range& lower, Range& upper) const {
-    Chosen chosen = wanted;
-    const Binning binning(bounds, options_.bins);
-    const std::uint32_t blocks = (range.count + kBlock - 1) / kBlock;
-    std::vector<Counts> counts(blocks);
-    const auto for_blocks = [&](const auto& body) {
-      if (blocks == 1) {
-        body(0u);
-      } else {
-        tbb::parallel_for(0u, blocks, body);
-      }
+  // Calls body(block, first, count) for runs of references, at the same time.
+  template <class Body>
+  static void for_blocks(std::uint32_t count, const Body& body) {
+    const std::uint32_t blocks = (count + kBlock - 1) / kBlock;
+    const auto run = [&](std::uint32_t block) {
+      body(block, block * kBlock, std::min(kBlock, count - block * kBlock));
     };
-    const auto count_all = [&] {
-      for_blocks([&](std::uint32_t block) {
-        Counts sum;
-        const std::uint32_t end = std::min((block + 1) * kBlock, range.count);
-        for (std::uint32_t i = block * kBlock; i < end; ++i) {
-          const Side side = place(from[i], chosen, binning, nullptr, nullptr);
-          sum.lower += (side & kLower) != 0;
-          sum.upper += (side & kUpper) != 0;
-        }
-        counts[block] = sum;
-      });
-      Counts all;
-      for (const Counts& c : counts) {
-        all.lower += c.lower;
-        all.upper += c.upper;
-      }
-      return all;
-    };
-    Counts all = count_all();
-    if (chosen.spatial.axis >= 0 &&
-        (all.lower + all.upper > range.count + range.room || all.lower >= range.count ||
-         all.upper >= range.count || all.lower == 0 || all.upper == 0)) {
-      // Not enough room, or nothing gained: fall back on the object split.
-      chosen.spatial.axis = -1;
-      if (chosen.object.axis >= 0) all = count_all();
+    if (blocks == 1) {
+      run(0);
+    } else {
+      tbb::parallel_for(0u, blocks, run);
     }
-    if (chosen.by_rank()) {
-      all = {range.count / 2, range.count - range.count / 2};
-      share_out(range, all.lower, all.upper, lower, upper);
-      std::copy_n(from, all.lower, to + lower.first);
-      std::copy_n(from + all.lower, all.upper, to + upper.first);
-      return;
-    }
-    share_out(range, all.lower, all.upper, lower, upper);
+  }
+  // From how many each block sends to either side to where its first ones go; returns all.
+  static Counts sum_up(std::vector<Counts>& counts) {
     Counts sum;
     for (Counts& c : counts) {
       const Counts own = c;
@@ -271,28 +257,73 @@ class BinaryBuilder {
       sum.lower += own.lower;
       sum.upper += own.upper;
     }
-    for_blocks([&](std::uint32_t block) {
-      Reference* low = to + lower.first + counts[block].lower;
-      Reference* high = to + upper.first + counts[block].upper;
-      const std::uint32_t end = std::min((block + 1) * kBlock, range.count);
-      for (std::uint32_t i = block * kBlock; i < end; ++i) {
+    return sum;
+  }
+
+  void scatter(const Range& range, const Reference* from, const ObjectSplit& split,
+               const Binning& binning, Reference* to, Sides& sides) const {
+    std::vector<Counts> counts((range.count + kBlock - 1) / kBlock);
+    for_blocks(range.count, [&](std::uint32_t block, std::uint32_t first, std::uint32_t count) {
+      const std::uint32_t lower = splitter_.count_lower(from + first, count, binning, split);
+      counts[block] = {lower, count - lower};
+    });
+    const Counts all = sum_up(counts);
+    share_out(range, all.lower, all.upper, sides.lower, sides.upper);
+    std::vector<Bounds8> bounds(2 * counts.size());
+    for_blocks(range.count, [&](std::uint32_t block, std::uint32_t first, std::uint32_t count) {
+      Scatter work{from + first,
+                   count,
+                   to + sides.lower.first + counts[block].lower,
+                   to + sides.upper.first + counts[block].upper,
+                   {},
+                   {}};
+      splitter_.scatter(work, binning, split);
+      bounds[2 * block] = work.lower;
+      bounds[2 * block + 1] = work.upper;
+    });
+    for (std::size_t i = 0; i < bounds.size(); i += 2) {
+      sides.lower_bounds = joined(sides.lower_bounds, bounds[i]);
+      sides.upper_bounds = joined(sides.upper_bounds, bounds[i + 1]);
+    }
+  }
+
+  // False: not enough room for the parts, or nothing gained.
+  bool cut_all(const Range& range, const Reference* from, const SpatialSplit& split, Reference* to,
+               Sides& sides) const {
+    std::vector<Counts> counts((range.count + kBlock - 1) / kBlock);
+    for_blocks(range.count, [&](std::uint32_t block, std::uint32_t first, std::uint32_t count) {
+      for (std::uint32_t i = first; i < first + count; ++i) {
+        const Side side = place(from[i], split, nullptr, nullptr);
+        counts[block].lower += (side & kLower) != 0;
+        counts[block].upper += (side & kUpper) != 0;
+      }
+    });
+    const Counts all = sum_up(counts);
+    if (all.lower + all.upper > range.count + range.room || all.lower >= range.count ||
+        all.upper >= range.count || all.lower == 0 || all.upper == 0) {
+      return false;
+    }
+    share_out(range, all.lower, all.upper, sides.lower, sides.upper);
+    for_blocks(range.count, [&](std::uint32_t block, std::uint32_t first, std::uint32_t count) {
+      Reference* low = to + sides.lower.first + counts[block].lower;
+      Reference* high = to + sides.upper.first + counts[block].upper;
+      for (std::uint32_t i = first; i < first + count; ++i) {
         Reference a = from[i], b = from[i];
-        const Side side = place(from[i], chosen, binning, &a, &b);
+        const Side side = place(from[i], split, &a, &b);
         if (side & kLower) *low++ = a;
         if (side & kUpper) *high++ = b;
       }
     });
+    return true;
   }
 
   // The side of a reference, and its parts where it is cut and they are asked for.
-  Side place(const Reference& reference, const Chosen& chosen, const Binning& binning,
-             Reference* lower, Reference* upper) const {
-    const Side side = side_of(reference, chosen, binning);
+  Side place(const Reference& reference, const SpatialSplit& split, Reference* lower,
+             Reference* upper) const {
+    const Side side = side_of(reference, split);
     if (side != kBoth) return side;
     Reference a, b;
-    if (!cut(input_, reference, chosen.spatial.axis, chosen.spatial.plane, &a, &b)) {
-      return nearer(reference, chosen.spatial);
-    }
+    if (!cut(input_, reference, split.axis, split.plane, &a, &b)) return nearer(reference, split);
     if (lower != nullptr) {
       *lower = a;
       *upper = b;

@@ -11,7 +11,9 @@
 #include <memory>
 
 #include "backend/octree/leaf_triangle.h"
+#include "backend/octree/plan.h"
 #include "backend/octree/tree.h"
+#include "backend/util/huge_pages.h"
 
 namespace octrace::octree {
 
@@ -19,118 +21,7 @@ namespace {
 
 using kernels::kChildren;
 
-// Measured: a triangle test costs about half a node test; less makes larger leaves.
-constexpr float kNodeCost = 1.0f;
-constexpr float kTriangleCost = 0.5f;
 constexpr std::uint32_t kParallel = 4096;  // references worth a task
-// Reinsertion may deepen the tree; no tree of use comes near this.
-constexpr int kMaxBinaryDepth = 1000;
-
-// A plan. Bit 0: in one slot, the subtree is a leaf. Bits 3j - 5 to 3j - 3, for j = 2 to 8: of j
-// slots, how many the first child gets; 0: the subtree takes but one of them. Bits 27 to 31: the
-// logarithm of the references below.
-constexpr std::uint32_t kLeafPlan = 1;
-constexpr std::uint32_t slots_mask(int slots) { return 7u << (3 * slots - 5); }
-int first_slots(std::uint32_t plan, int slots) {
-  return static_cast<int>((plan >> (3 * slots - 5)) & 7u);
-}
-std::uint32_t about_count(std::uint32_t plan) { return 1u << (plan >> 27); }
-
-// The least cost of a subtree in at most 1 to 8 slots, in words 8 to 15; words 0 to 7 are infinite,
-// so that a vector of costs can be read at an offset.
-struct Costs {
-  float word[16];
-  std::uint32_t references;
-
-  float& in(int slots) { return word[7 + slots]; }
-};
-
-class Planner {
- public:
-  Planner(BinaryNode* nodes, std::uint32_t leaf) : nodes_(nodes), leaf_(leaf) {}
-
-  bool run() {
-    Costs costs;
-    plan(BinaryTree::kRoot, 0, costs);
-    return !too_deep_;
-  }
-
- private:
-  void plan(std::uint32_t index, int depth, Costs& costs) {
-    BinaryNode& node = nodes_[index];
-    const float area = node.half_area();
-    std::fill_n(costs.word, 8, std::numeric_limits<float>::infinity());
-    if (node.leaf()) {
-      std::fill_n(costs.word + 8, 8, area * kTriangleCost);
-      costs.references = 1;
-      node.plan = kLeafPlan;
-      return;
-    }
-    if (depth == kMaxBinaryDepth) {
-      too_deep_ = true;
-      std::fill_n(costs.word + 8, 8, 0.0f);
-      costs.references = 1;
-      return;
-    }
-    const std::uint32_t first = 2 * node.child;
-    Costs a, b;
-    if (node.plan > kParallel) {  // still the builder's count
-      tbb::parallel_invoke([&] { plan(first, depth + 1, a); },
-                           [&] { plan(first + 1, depth + 1, b); });
-    } else {
-      plan(first, depth + 1, a);
-      plan(first + 1, depth + 1, b);
-    }
-    node.plan = combine(area, a, b, costs);
-  }
-
-  // For each number of slots the best way to share them out. A subtree of few references has no use
-  // for more slots than those, so only shares of the smaller subtree are tried.
-  std::uint32_t combine(float area, const Costs& a, const Costs& b, Costs& costs) const {
-    const bool a_is_smaller = a.references < b.references;
-    const Costs& small = a_is_smaller ? a : b;
-    const Costs& large = a_is_smaller ? b : a;
-    float best[kChildren];
-    std::int32_t share[kChildren];
-    for (int i = 0; i < kChildren; ++i) {
-      best[i] = small.word[8] + large.word[7 + i];
-      share[i] = 1;
-    }
-    const int most = static_cast<int>(std::min<std::uint32_t>(small.references, kChildren - 1));
-    for (int k = 2; k <= most; ++k) {
-      const float own = small.word[7 + k];
-      for (int i = 0; i < kChildren; ++i) {
-        const float cost = own + large.word[8 + i - k];
-        const bool better = cost < best[i];
-        best[i] = better ? cost : best[i];
-        share[i] = better ? k : share[i];
-      }
-    }
-    costs.references = a.references + b.references;
-    const float inner = best[kChildren - 1] + area * kNodeCost;
-    const float leaf = costs.references <= leaf_
-                           ? area * kTriangleCost * static_cast<float>(costs.references)
-                           : std::numeric_limits<float>::infinity();
-    const float one = std::min(inner, leaf);
-    std::uint32_t plan = leaf <= inner ? kLeafPlan : 0u;
-    plan |= static_cast<std::uint32_t>(std::bit_width(costs.references) - 1) << 27;
-    costs.in(1) = one;
-    for (int slots = 2; slots <= kChildren; ++slots) {
-      const float cost = best[slots - 1];
-      const int first = a_is_smaller ? share[slots - 1] : slots - share[slots - 1];
-      // A node's own eight slots are always shared out.
-      if (cost < one || slots == kChildren) {
-        plan |= static_cast<std::uint32_t>(first) << (3 * slots - 5);
-      }
-      costs.in(slots) = std::min(cost, one);
-    }
-    return plan;
-  }
-
-  BinaryNode* nodes_;
-  const std::uint32_t leaf_;
-  std::atomic<bool> too_deep_{false};
-};
 
 // The children of an eight-way node, as binary nodes.
 struct Family {
@@ -181,8 +72,8 @@ class Writer {
   bool run() {
     const std::unique_ptr<Plot> root = survey(BinaryTree::kRoot, 1);
     if (root->size.height > kernels::kMaxDepth) return false;
-    octree_.nodes.resize(root->size.nodes);
-    octree_.triangles.resize(root->size.triangles);
+    util::resize_in_huge_pages(octree_.nodes, root->size.nodes);
+    util::resize_in_huge_pages(octree_.triangles, root->size.triangles);
     write(*root, 0, {1, 0});
     return true;
   }
@@ -305,13 +196,14 @@ class Writer {
     node.first_child = place.node;
     node.first_triangle = place.triangle;
     int inner = 0;
+    Leaves leaves;
     for (unsigned slot = 0; slot < kChildren; ++slot) {
       const int i = at[slot];
       if (i < 0) continue;
       if (leaf(family.index[i])) {
-        const std::uint32_t offset = place.triangle - node.first_triangle;
-        write_leaf(family.index[i], place);
-        const std::uint32_t count = place.triangle - node.first_triangle - offset;
+        const std::uint32_t offset = leaves.count;
+        gather(family.index[i], leaves);
+        const std::uint32_t count = leaves.count - offset;
         node.meta[slot] = static_cast<std::uint8_t>(((1u << count) - 1u) << 5 | offset);
       } else {
         node.inner_mask |= static_cast<std::uint8_t>(1u << slot);
@@ -319,18 +211,45 @@ class Writer {
         order[inner++] = static_cast<std::uint8_t>(i);
       }
     }
+    write_triangles(leaves, place.triangle);
+    place.triangle += leaves.count;
     place.node += static_cast<std::uint32_t>(inner);
     return inner;
   }
 
-  void write_leaf(std::uint32_t index, Place& place) {
+  struct Leaves {
+    std::array<std::uint32_t, kernels::kMaxNodeTriangles> triangles;
+    std::uint32_t count = 0;
+  };
+
+  void gather(std::uint32_t index, Leaves& leaves) const {
     const BinaryNode& node = nodes_[index];
     if (node.leaf()) {
-      octree_.triangles[place.triangle++] = leaf_triangle(input_, node.triangle());
+      leaves.triangles[leaves.count++] = node.triangle();
       return;
     }
-    write_leaf(2 * node.child, place);
-    write_leaf(2 * node.child + 1, place);
+    gather(2 * node.child, leaves);
+    gather(2 * node.child + 1, leaves);
+  }
+
+  // Triangles that lie together in space may lie anywhere in the scene: all are asked for before
+  // the first is used.
+  void write_triangles(const Leaves& leaves, std::uint32_t place) {
+    for (std::uint32_t i = 0; i < leaves.count; ++i) {
+      __builtin_prefetch(&input_.triangles[leaves.triangles[i]]);
+      if (!input_.triangle_geometry.empty()) {
+        __builtin_prefetch(&input_.triangle_geometry[leaves.triangles[i]]);
+      }
+    }
+    for (std::uint32_t i = 0; i < leaves.count; ++i) {
+      const kernels::Triangle& triangle = input_.triangles[leaves.triangles[i]];
+      for (const std::uint32_t corner : {triangle.a, triangle.b, triangle.c}) {
+        __builtin_prefetch(&input_.positions[corner]);
+      }
+    }
+    for (std::uint32_t i = 0; i < leaves.count; ++i) {
+      octree_.triangles[place + i] = leaf_triangle(input_, leaves.triangles[i]);
+    }
   }
 
   const BinaryNode* nodes_;
@@ -342,7 +261,7 @@ class Writer {
 
 bool collapse(BinaryTree& tree, std::uint32_t leaf_triangles, const BuildInput& input,
               Octree& octree) {
-  return Planner(tree.nodes.get(), leaf_triangles).run() && Writer(tree, input, octree).run();
+  return plan(tree, leaf_triangles) && Writer(tree, input, octree).run();
 }
 
 }  // namespace octrace::octree

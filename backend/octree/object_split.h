@@ -8,7 +8,7 @@
 
 namespace octrace::octree {
 
-inline constexpr int kMaxBins = 32;
+inline constexpr int kMaxBins = 32;  // numbers of bins are multiples of eight
 
 // Where a centre falls along each axis: (centre2 - lower) * scale.
 struct Binning {
@@ -35,6 +35,16 @@ struct ObjectSplit {
   float overlap = 0.0f;  // half the surface of what the two sides' boxes share
 };
 
+// What a split does to a run of references. `low` and `high` say where those of either side go, in
+// their order.
+struct Scatter {
+  const Reference* from;
+  std::uint32_t count;
+  Reference* low;
+  Reference* high;
+  Bounds8 lower, upper;  // of what went there
+};
+
 // Nodes of a subtree that one thread builds.
 struct SubtreeRange {
   Reference* references;
@@ -50,6 +60,10 @@ struct ObjectSplitter {
   Bounds8 (*bounds)(const Reference*, std::uint32_t count);
   void (*fill)(const Reference*, std::uint32_t count, const Binning&, ObjectBins&);
   ObjectSplit (*best)(const ObjectBins&, int bins);
+  // How many go to the lower side.
+  std::uint32_t (*count_lower)(const Reference*, std::uint32_t count, const Binning&,
+                               const ObjectSplit&);
+  void (*scatter)(Scatter&, const Binning&, const ObjectSplit&);
   void (*subtree)(const SubtreeRange&);  // reorders the references
 
   ObjectSplitter();  // for the instruction set of this machine

@@ -10,6 +10,7 @@
 #include <limits>
 
 #include "backend/octree/box.h"
+#include "backend/util/huge_pages.h"
 
 namespace octrace::octree {
 
@@ -61,9 +62,10 @@ class Widener {
   void run() {
     if (!measure()) return;
     const std::uint32_t nodes = std::max(subtrees_[0].wide_nodes, 1u);
-    to_.nodes.resize(nodes);
-    to_.leaves.resize(std::uint64_t{subtrees_[0].triangles} * kernels::kLeafRows +
-                      kWideLanes * kernels::kLeafRows);
+    util::resize_in_huge_pages(to_.nodes, nodes);
+    util::resize_in_huge_pages(to_.leaves,
+                               std::uint64_t{subtrees_[0].triangles} * kernels::kLeafRows +
+                                   kWideLanes * kernels::kLeafRows);
     const Box box = write(0, 0, 1, 0, 0.0f);
     to_.lower = {box.lower[0], box.lower[1], box.lower[2]};
     to_.upper = {box.upper[0], box.upper[1], box.upper[2]};

@@ -1,0 +1,134 @@
+#include "backend/octree/plan.h"
+
+#include <tbb/parallel_invoke.h>
+
+#include <atomic>
+#include <bit>
+
+#include "kernels/node.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "backend/octree/plan.cpp"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+#include "backend/octree/eight-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace octrace::octree::HWY_NAMESPACE {
+
+using kernels::kChildren;
+
+// Measured: a triangle test costs about half a node test; less makes larger leaves.
+constexpr float kNodeCost = 1.0f;
+constexpr float kTriangleCost = 0.5f;
+constexpr std::uint32_t kParallel = 4096;  // references worth a task
+// Reinsertion may deepen the tree; no tree of use comes near this.
+constexpr int kMaxBinaryDepth = 1000;
+
+// The least cost of a subtree in at most 1 to 8 slots, in words 8 to 15; words 0 to 7 are infinite,
+// so that eight costs can be read at an offset.
+struct Costs {
+  alignas(32) float word[16];
+  std::uint32_t references;
+};
+
+class Planner {
+ public:
+  Planner(BinaryNode* nodes, std::uint32_t leaf) : nodes_(nodes), leaf_(leaf) {}
+
+  HWY_ATTR bool run() {
+    Costs costs;
+    plan(BinaryTree::kRoot, 0, costs);
+    return !too_deep_;
+  }
+
+ private:
+  HWY_ATTR void plan(std::uint32_t index, int depth, Costs& costs) {
+    BinaryNode& node = nodes_[index];
+    store(infinities(), costs.word);
+    if (node.leaf() || depth == kMaxBinaryDepth) {
+      too_deep_ = too_deep_ || !node.leaf();
+      store(eight(node.half_area() * kTriangleCost), costs.word + 8);
+      costs.references = 1;
+      node.plan = kLeafPlan;
+      return;
+    }
+    const std::uint32_t first = 2 * node.child;
+    Costs a, b;
+    if (node.plan > kParallel) {  // still the builder's count
+      tbb::parallel_invoke([&] { plan(first, depth + 1, a); },
+                           [&] { plan(first + 1, depth + 1, b); });
+    } else {
+      plan(first, depth + 1, a);
+      plan(first + 1, depth + 1, b);
+    }
+    node.plan = combine(node.half_area(), a, b, costs);
+  }
+
+  // For each number of slots the best way to share them out.
+  HWY_ATTR HWY_INLINE std::uint32_t combine(float area, const Costs& a, const Costs& b,
+                                            Costs& costs) const {
+    const hn::RebindToUnsigned<decltype(kTag)> du;
+    Eight best;
+    hn::Vec<decltype(du)> share[kParts];  // of the first child, for 1 to 8 slots
+    for (std::size_t part = 0; part < kParts; ++part) {
+      const float* theirs = b.word + 8 + part * kLanes;
+      best.part[part] = hn::Add(hn::Set(kTag, a.word[8]), hn::LoadU(kTag, theirs - 1));
+      share[part] = hn::Set(du, 1);
+      for (int k = 2; k < kChildren; ++k) {
+        const auto cost = hn::Add(hn::Set(kTag, a.word[7 + k]), hn::LoadU(kTag, theirs - k));
+        const auto better = hn::Lt(cost, best.part[part]);
+        best.part[part] = hn::IfThenElse(better, cost, best.part[part]);
+        share[part] = hn::IfThenElse(hn::RebindMask(du, better),
+                                     hn::Set(du, static_cast<std::uint32_t>(k)), share[part]);
+      }
+    }
+    costs.references = a.references + b.references;
+    alignas(32) float sums[8];
+    store(best, sums);
+    const float inner = sums[kChildren - 1] + area * kNodeCost;
+    const float leaf = costs.references <= leaf_
+                           ? area * kTriangleCost * static_cast<float>(costs.references)
+                           : std::numeric_limits<float>::infinity();
+    const float one = std::min(inner, leaf);
+    std::uint32_t plan = leaf <= inner ? kLeafPlan : 0u;
+    plan |= static_cast<std::uint32_t>(std::bit_width(costs.references) - 1) << 27;
+    alignas(32) static constexpr std::uint32_t kFactor[8] = {
+        0, 1u << 1, 1u << 4, 1u << 7, 1u << 10, 1u << 13, 1u << 16, 1u << 19};
+    const auto whole = hn::Set(kTag, one);
+    for (std::size_t part = 0; part < kParts; ++part) {
+      // A node's own eight slots are always shared out.
+      const auto divided = hn::Or(hn::Lt(best.part[part], whole),
+                                  hn::Eq(slots(part), hn::Set(kTag, float{kChildren - 1})));
+      const auto bits = hn::Mul(share[part], hn::Load(du, kFactor + part * kLanes));
+      plan |=
+          hn::GetLane(hn::SumOfLanes(du, hn::IfThenElseZero(hn::RebindMask(du, divided), bits)));
+    }
+    store(lesser(best, eight(one)), costs.word + 8);
+    return plan;
+  }
+
+  BinaryNode* nodes_;
+  const std::uint32_t leaf_;
+  std::atomic<bool> too_deep_{false};
+};
+
+HWY_ATTR bool plan_all(BinaryNode* nodes, std::uint32_t leaf_triangles) {
+  return Planner(nodes, leaf_triangles).run();
+}
+
+}  // namespace octrace::octree::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace octrace::octree {
+
+HWY_EXPORT(plan_all);
+
+bool plan(BinaryTree& tree, std::uint32_t leaf_triangles) {
+  return HWY_DYNAMIC_DISPATCH(plan_all)(tree.nodes.get(), leaf_triangles);
+}
+
+}  // namespace octrace::octree
+#endif

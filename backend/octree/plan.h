@@ -1,0 +1,22 @@
+// Which nodes of a binary tree become eight-way nodes, leaves or nothing, by dynamic programming,
+// so that the expected cost of a ray by the surface-area heuristic is least (Ylitie, Karras, Laine
+// 2017, "Efficient incoherent ray traversal on GPUs through compressed wide BVHs", section 3).
+#pragma once
+
+#include "backend/octree/binary_tree.h"
+
+namespace octrace::octree {
+
+// A plan, kept in the binary node. Bit 0: in one slot, the subtree is a leaf. Bits 3j - 5 to
+// 3j - 3, for j = 2 to 8: of j slots, how many the first child gets; 0: the subtree takes but one
+// of them. Bits 27 to 31: the logarithm of the references below.
+inline constexpr std::uint32_t kLeafPlan = 1;
+inline int first_slots(std::uint32_t plan, int slots) {
+  return static_cast<int>((plan >> (3 * slots - 5)) & 7u);
+}
+inline std::uint32_t about_count(std::uint32_t plan) { return 1u << (plan >> 27); }
+
+// Overwrites the nodes' plans. False: the tree is too deep to be of use.
+bool plan(BinaryTree& tree, std::uint32_t leaf_triangles);
+
+}  // namespace octrace::octree
