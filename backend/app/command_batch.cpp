@@ -83,13 +83,25 @@ Result<batch::Plan> make_plan(BatchRequest& request) {
   return batch::Plan::make(std::move(*job), base, request.run.limits);
 }
 
+// Many file systems, and all listings, are slow with more files in a folder.
+constexpr std::uint64_t kCrowd = 100'000;
+
+void warn_of_crowds(const batch::Plan& plan) {
+  const batch::Plan::Crowd crowd = plan.largest_crowd();
+  if (crowd.files <= kCrowd) return;
+  util::log_warning(
+      fmt::format("{} files in the one folder {}: a part such as {{view/1000:06}}/ in the output's "
+                  "path spreads them",
+                  crowd.files, crowd.folder.empty() ? "." : crowd.folder));
+}
+
 Result<util::Exit> dry_run(const batch::Plan& plan, const BatchRequest& request) {
   auto done = batch::read_done(plan, plan.meaning(request.run.limits), request.run.shard);
   if (!done && !(request.run.force && done.error().exit == util::Exit::usage)) return done.error();
   const auto [begin, end] = plan.part(request.run.shard);
   std::uint64_t there = 0;
   for (std::uint64_t index = begin; index < end; ++index) {
-    if (!request.run.force && done->views[index]) {
+    if (!request.run.force && done->has(index)) {
       ++there;
       continue;
     }
@@ -136,8 +148,9 @@ Result<util::Exit> run_batch(BatchRequest request) {
   request.run.shard = *shard;
   auto plan = make_plan(request);
   if (!plan) return plan.error();
-  if (request.dry_run) return dry_run(*plan, request);
   if (request.merge) return merge(*plan, request);
+  warn_of_crowds(*plan);
+  if (request.dry_run) return dry_run(*plan, request);
   preload_libraries(batch::needs_image_library(plan->files(plan->view(0))));
   BatchProgress progress(request.progress);
   request.run.progress = [&](const batch::Standing& standing) { progress.update(standing); };

@@ -4,6 +4,8 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cstring>
 #include <fstream>
@@ -17,19 +19,35 @@ util::Error io_error(const std::string& file, std::string_view what, int error_n
           file, ""};
 }
 
+// Bytes up to the end of the last line that has one; -1: errno says why not.
+off_t whole_lines(int descriptor) {
+  std::array<char, 1 << 16> block{};
+  off_t end = ::lseek(descriptor, 0, SEEK_END);
+  while (end > 0) {
+    const off_t begin = std::max<off_t>(0, end - static_cast<off_t>(block.size()));
+    const ssize_t got =
+        ::pread(descriptor, block.data(), static_cast<std::size_t>(end - begin), begin);
+    if (got < 0) return -1;
+    const std::string_view text(block.data(), static_cast<std::size_t>(got));
+    const std::size_t line = text.rfind('\n');
+    if (line != std::string_view::npos) return begin + static_cast<off_t>(line) + 1;
+    end = begin;
+  }
+  return end;
+}
+
 }  // namespace
 
 util::Result<Journal> Journal::open(const std::string& path) {
   const int descriptor = ::open(path.c_str(), O_RDWR | O_CREAT | O_APPEND | O_CLOEXEC, 0666);
   if (descriptor < 0) return io_error(path, "cannot be opened", errno);
   Journal journal(path, descriptor, 0);
-  util::Result<JournalText> text =
-      read_journal(path, [](const nlohmann::ordered_json&) { return util::Result<void>(); });
-  if (!text) return text.error();
-  if (::ftruncate(descriptor, static_cast<off_t>(text->whole_bytes)) != 0) {
+  const off_t bytes = whole_lines(descriptor);
+  if (bytes < 0) return io_error(path, "cannot be read", errno);
+  if (::ftruncate(descriptor, bytes) != 0) {
     return io_error(path, "cannot be cut to its last whole line", errno);
   }
-  journal.bytes_ = text->whole_bytes;
+  journal.bytes_ = static_cast<std::uint64_t>(bytes);
   return journal;
 }
 

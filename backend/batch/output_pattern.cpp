@@ -73,15 +73,26 @@ util::Result<OutputPattern::Piece> OutputPattern::parse_field(std::string_view t
     return util::Error{util::Exit::usage, "", fmt::format("{{{}}}: {}", text, what), "", ""};
   };
   const std::size_t colon = text.find(':');
+  const std::string_view field = text.substr(0, colon);
+  const std::size_t slash = field.find('/');
   const auto* found = std::find_if(kNames.begin(), kNames.end(), [&](const Name& name) {
-    return name.name == text.substr(0, colon);
+    return name.name == field.substr(0, slash);
   });
   if (found == kNames.end()) {
     return wrong(
         "there is no such field; there are {scene}, {camera}, {frame}, {view}, {scene_index}, "
         "{camera_index} and {aov}; {{ is a brace");
   }
-  Piece piece{found->field, "", 0};
+  Piece piece{found->field, "", 0, 1};
+  if (slash != std::string_view::npos) {
+    const std::string_view divisor = field.substr(slash + 1);
+    const char* end = divisor.data() + divisor.size();
+    const auto [stop, error] = std::from_chars(divisor.data(), end, piece.divisor);
+    if (!found->number || error != std::errc() || stop != end || piece.divisor < 1) {
+      return wrong(found->number ? "needs a whole number after /, as in {view/1000}"
+                                 : "is a name, which cannot be divided");
+    }
+  }
   if (colon == std::string_view::npos) return piece;
   const std::string_view width = text.substr(colon + 1);
   const char* end = width.data() + width.size();
@@ -100,7 +111,7 @@ util::Result<OutputPattern> OutputPattern::parse(std::string_view text) {
   pattern.text_ = text;
   std::string literal;
   const auto end_literal = [&] {
-    if (!literal.empty()) pattern.pieces_.push_back({Field::literal, literal, 0});
+    if (!literal.empty()) pattern.pieces_.push_back({Field::literal, literal, 0, 1});
     literal.clear();
   };
   for (std::size_t i = 0; i < text.size(); ++i) {
@@ -130,38 +141,33 @@ util::Result<OutputPattern> OutputPattern::parse(std::string_view text) {
 
 std::string OutputPattern::path(const PathFields& fields) const {
   std::string path;
-  const auto number = [&](std::int64_t value, int width) {
-    fmt::format_to(std::back_inserter(path), "{:0{}}", value, width);
-  };
-  for (const Piece& piece : pieces_) {
-    switch (piece.field) {
-      case Field::literal:
-        path += piece.literal;
-        break;
-      case Field::scene:
-        path += fields.scene;
-        break;
-      case Field::camera:
-        path += fields.camera;
-        break;
-      case Field::aov:
-        path += fields.aov;
-        break;
-      case Field::frame:
-        number(fields.frame, piece.width);
-        break;
-      case Field::view:
-        number(static_cast<std::int64_t>(fields.view), piece.width);
-        break;
-      case Field::scene_index:
-        number(static_cast<std::int64_t>(fields.scene_index), piece.width);
-        break;
-      case Field::camera_index:
-        number(static_cast<std::int64_t>(fields.camera_index), piece.width);
-        break;
-    }
-  }
+  for (const Piece& piece : pieces_) path += OutputPattern::path(piece, fields);
   return path;
+}
+
+std::string OutputPattern::path(const Piece& piece, const PathFields& fields) {
+  const auto number = [&](std::uint64_t value) {
+    return fmt::format("{:0{}}", static_cast<std::int64_t>(value) / piece.divisor, piece.width);
+  };
+  switch (piece.field) {
+    case Field::literal:
+      return piece.literal;
+    case Field::scene:
+      return fields.scene;
+    case Field::camera:
+      return fields.camera;
+    case Field::aov:
+      return fields.aov;
+    case Field::frame:
+      return number(static_cast<std::uint64_t>(fields.frame));
+    case Field::view:
+      return number(fields.view);
+    case Field::scene_index:
+      return number(fields.scene_index);
+    case Field::camera_index:
+      return number(fields.camera_index);
+  }
+  return {};
 }
 
 bool OutputPattern::has_aov() const {

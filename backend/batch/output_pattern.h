@@ -19,22 +19,26 @@ struct PathFields {
 
 class OutputPattern {
  public:
-  // The error's message says what is wrong, without a place.
-  static util::Result<OutputPattern> parse(std::string_view text);
-
-  std::string path(const PathFields& fields) const;
-  bool has_aov() const;
-  std::string folder() const;     // up to the last '/' before the first field; may be empty
-  std::string_view tail() const;  // the text after the last field: it holds the extension
-  const std::string& text() const { return text_; }
-
- private:
   enum class Field { literal, scene, camera, frame, view, scene_index, camera_index, aov };
   struct Piece {
     Field field = Field::literal;
     std::string literal;
-    int width = 0;  // of a number, with leading zeros
+    int width = 0;             // of a number, with leading zeros
+    std::int64_t divisor = 1;  // of a number: {view/1000}
   };
+
+  // The error's message says what is wrong, without a place.
+  static util::Result<OutputPattern> parse(std::string_view text);
+
+  std::string path(const PathFields& fields) const;
+  static std::string path(const Piece& piece, const PathFields& fields);
+  bool has_aov() const;
+  std::string folder() const;     // up to the last '/' before the first field; may be empty
+  std::string_view tail() const;  // the text after the last field: it holds the extension
+  const std::string& text() const { return text_; }
+  const std::vector<Piece>& pieces() const { return pieces_; }
+
+ private:
   static util::Result<Piece> parse_field(std::string_view text);
   std::string text_;
   std::vector<Piece> pieces_;

@@ -7,6 +7,7 @@
 #include <unordered_map>
 
 #include "backend/batch/camera_sets.h"
+#include "backend/batch/distinct_paths.h"
 #include "backend/batch/hash.h"
 #include "backend/batch/scene_probe.h"
 
@@ -179,6 +180,24 @@ std::vector<Output> Plan::files(const View& view) const {
   return files;
 }
 
+Plan::Crowd Plan::largest_crowd() const {
+  Crowd largest;
+  for (std::size_t i = 0; i < job_.outputs.size(); ++i) {
+    const OutputPattern& pattern = job_.outputs[i].pattern;
+    const auto& pieces = pattern.pieces();
+    const auto spreads = [](const OutputPattern::Piece& piece) {
+      return piece.field == OutputPattern::Field::literal &&
+             piece.literal.find('/') != std::string::npos;
+    };
+    const bool starts_with_text =
+        !pieces.empty() && pieces.front().field == OutputPattern::Field::literal;
+    if (std::any_of(pieces.begin() + (starts_with_text ? 1 : 0), pieces.end(), spreads)) continue;
+    const std::uint64_t files = views() * job_.outputs[i].files.size();
+    if (files > largest.files) largest = {patterns_folder_[i] + pattern.folder(), files};
+  }
+  return largest;
+}
+
 render::AovSet Plan::needed_aovs() const {
   render::AovSet needed;
   for (const JobOutput& output : job_.outputs) needed |= batch::needed_aovs(output.files);
@@ -186,7 +205,32 @@ render::AovSet Plan::needed_aovs() const {
   return needed;
 }
 
+bool Plan::paths_surely_differ() const {
+  PathSpace space{scene_names_, {}, job_.frames, views()};
+  if (own_.empty()) {
+    space.cameras = {&common_.path_names};
+  } else {
+    for (const SceneCameras& cameras : own_) space.cameras.push_back(&cameras.path_names);
+  }
+  for (std::size_t i = 0; i < job_.outputs.size(); ++i) {
+    const JobOutput& output = job_.outputs[i];
+    std::vector<std::string> aovs;
+    for (std::size_t f = 0; output.pattern.has_aov() && f < output.files.size(); ++f) {
+      aovs.push_back(path_name(output.aov_words[f]));
+    }
+    if (!surely_distinct(output.pattern, aovs, space)) return false;
+    for (std::size_t j = 0; j < i; ++j) {
+      if (!surely_apart(patterns_folder_[i], output.pattern, patterns_folder_[j],
+                        job_.outputs[j].pattern)) {
+        return false;
+      }
+    }
+  }
+  return true;
+}
+
 Result<void> Plan::check_paths() const {
+  if (paths_surely_differ()) return {};
   // Hashes first: a job may have millions of paths, and two equal ones are rare.
   std::vector<std::uint64_t> hashes;
   const auto each = [&](const auto& use) {

@@ -48,6 +48,13 @@ class Plan {
   const std::string& folder() const { return folder_; }
   std::vector<Output> files(const View& view) const;
   render::AovSet needed_aovs() const;
+  // The folder that all of an output's files go into, and how many they are; 0: more than one
+  // folder.
+  struct Crowd {
+    std::string folder;
+    std::uint64_t files = 0;
+  };
+  Crowd largest_crowd() const;
 
   // What the job comes to: everything that decides what is rendered, with defaults, and the scene
   // files' identity. Equal texts: equal outputs.
@@ -61,6 +68,7 @@ class Plan {
   };
   util::Result<void> find_cameras(const util::Limits& limits);
   void choose_folder(const std::string& base);
+  bool paths_surely_differ() const;  // false: they have to be compared
   util::Result<void> check_paths() const;
   const SceneCameras& cameras_of(std::size_t scene) const;
   PathFields fields(const View& view) const;

@@ -179,13 +179,6 @@ ordered_json summary_of(const Plan& plan, const JobResults& results) {
   return json;
 }
 
-Result<void> check_job(const Plan& plan, const util::Limits& limits) {
-  // Of its figures none is needed here; it says what changed where a journal is another job's.
-  auto done = read_done(plan, plan.meaning(limits), Shard());
-  if (!done) return done.error();
-  return {};
-}
-
 }  // namespace
 
 Result<JobResults> write_job_results(const Plan& plan) {
@@ -212,7 +205,7 @@ Result<JobResults> merge_job(const Plan& plan, const util::Limits& limits, doubl
   // Shard 1 of 1 is at odds with every other division and with itself.
   auto lock = RunLock::acquire(plan.folder(), Shard(), {wait_lock, true});
   if (!lock) return lock.error();
-  if (auto same = check_job(plan, limits); !same) return same.error();
+  if (auto same = check_same_job(plan, plan.meaning(limits)); !same) return same.error();
   auto results = write_job_results(plan);
   if (!results) return results.error();
   const std::string text =

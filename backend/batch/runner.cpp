@@ -103,7 +103,7 @@ std::vector<Work> Run::find_work() const {
     Work work{scene, std::max(begin, plan_.first_view(scene)),
               std::min(end, plan_.first_view(scene + 1)), 0};
     for (std::uint64_t view = work.begin; view < work.end; ++view) {
-      if (!done_.views[view]) ++work.left;
+      if (!done_.has(view)) ++work.left;
     }
     if (work.left > 0) all.push_back(work);
   }
@@ -181,7 +181,7 @@ void Run::run_scene(const Work& work, Opened opened, const Work* next) {
   next_.reset();
   std::uint64_t left = work.left;
   for (std::uint64_t index = work.begin; index < work.end && !stopping(); ++index) {
-    if (done_.views[index]) continue;
+    if (done_.has(index)) continue;
     if (next != nullptr && left == std::min(kLoadAhead, work.left)) {
       ahead_ = std::async(std::launch::async, [this, scene = next->scene] { return open(scene); });
     }
@@ -325,9 +325,7 @@ Result<RunSummary> run_plan(const Plan& plan, const RunOptions& options) {
   summary.broken_lines = done->broken_lines;
   const auto [begin, end] = plan.part(options.shard);
   summary.standing.views = end - begin;
-  for (std::uint64_t view = begin; view < end; ++view) {
-    if (done->views[view]) ++summary.standing.before;
-  }
+  summary.standing.before = done->count;
   auto journal = Journal::open(journal_path(plan.folder(), options.shard));
   if (!journal) return journal.error();
   if (!done->has_journal) {

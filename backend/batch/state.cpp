@@ -54,6 +54,20 @@ bool same_job(const ordered_json& header, const ordered_json& meaning) {
   return nlohmann::json(header.at("job")) == nlohmann::json(meaning);
 }
 
+Result<void> check_header(const ordered_json& line, const ordered_json& meaning,
+                          const std::string& path) {
+  if (line.is_null() || line.at("kind") != "job") {
+    return util::Error{util::Exit::io, "JOURNAL", "its first line is broken; --force starts anew",
+                       path, ""};
+  }
+  if (same_job(line, meaning)) return {};
+  return util::Error{
+      util::Exit::usage, "JOB_CHANGED",
+      fmt::format("the job is not the one that was begun in this folder: {} (--force starts anew)",
+                  changes(line.at("job"), meaning)),
+      path, ""};
+}
+
 bool files_are_there(const Plan& plan, std::uint64_t view, const ordered_json& line) {
   const std::vector<Output> files = plan.files(plan.view(view));
   const ordered_json& recorded = line.at("files");
@@ -66,12 +80,12 @@ bool files_are_there(const Plan& plan, std::uint64_t view, const ordered_json& l
   return true;
 }
 
-// The header of a journal; null where it has none yet.
+// The first line of a journal; null where it has none yet.
 Result<ordered_json> read_header(const std::string& path) {
   ordered_json header;
   const util::Error found{util::Exit::ok, "", "", "", ""};
   auto text = read_journal(path, [&](const ordered_json& line) -> Result<void> {
-    if (line.at("kind") == "job") header = line;
+    header = line;
     return found;  // one line is enough
   });
   if (!text && text.error().exit != util::Exit::ok) return text.error();
@@ -114,30 +128,32 @@ Result<void> make_folder(const std::string& folder) {
 }
 
 Result<Done> read_done(const Plan& plan, const ordered_json& meaning, const Shard& shard) {
+  const auto [begin, end] = plan.part(shard);
   Done done;
-  done.views.resize(plan.views());
+  done.begin = begin;
+  done.views.resize(end - begin);
   done.scenes_described.resize(plan.job().scenes.size());
   const std::string own = journal_path(plan.folder(), shard);
+  const std::string division = fmt::format("-of-{}.ndjson", shard.count);
+  bool checked_a_neighbour = false;
   for (const std::string& path : journals_in(plan.folder())) {
+    if (path != own && path.ends_with(division)) {
+      if (checked_a_neighbour) continue;
+      auto header = read_header(path);
+      if (!header) return header.error();
+      if (header->is_null()) continue;
+      if (auto same = check_header(*header, meaning, path); !same) return same.error();
+      checked_a_neighbour = true;
+      continue;
+    }
     bool first = true, ended = false;
     auto text = read_journal(path, [&](const ordered_json& line) -> Result<void> {
-      const std::string kind = line.at("kind");
       if (first) {
-        if (kind != "job") {
-          return util::Error{util::Exit::io, "JOURNAL",
-                             "its first line is broken; --force starts anew", path, ""};
-        }
-        if (!same_job(line, meaning)) {
-          return util::Error{
-              util::Exit::usage, "JOB_CHANGED",
-              fmt::format("the job is not the one that was begun in this folder: {} (--force "
-                          "starts anew)",
-                          changes(line.at("job"), meaning)),
-              path, ""};
-        }
+        if (auto same = check_header(line, meaning, path); !same) return same;
         if (path == own) done.has_journal = true;
       }
       first = false;
+      const std::string kind = line.at("kind");
       ended = kind == "end";
       if (kind == "scene" && path == own) {
         const auto scene = line.at("scene").get<std::size_t>();
@@ -145,8 +161,8 @@ Result<Done> read_done(const Plan& plan, const ordered_json& meaning, const Shar
       }
       if (kind != "view") return {};
       const auto view = line.at("view").get<std::uint64_t>();
-      if (view < done.views.size() && !done.views[view] && files_are_there(plan, view, line)) {
-        done.views[view] = true;
+      if (view >= begin && view < end && !done.has(view) && files_are_there(plan, view, line)) {
+        done.views[view - begin] = true;
         ++done.count;
       }
       return {};
@@ -158,6 +174,16 @@ Result<Done> read_done(const Plan& plan, const ordered_json& meaning, const Shar
   return done;
 }
 
+Result<void> check_same_job(const Plan& plan, const ordered_json& meaning) {
+  for (const std::string& path : journals_in(plan.folder())) {
+    auto header = read_header(path);
+    if (!header) return header.error();
+    if (header->is_null()) continue;
+    if (auto same = check_header(*header, meaning, path); !same) return same;
+  }
+  return {};
+}
+
 Result<void> forget(const Plan& plan, const ordered_json& meaning, const Shard& shard) {
   const std::string own = journal_path(plan.folder(), shard);
   const std::string division = fmt::format("-of-{}.ndjson", shard.count);
@@ -166,7 +192,7 @@ Result<void> forget(const Plan& plan, const ordered_json& meaning, const Shard& 
     bool keep = path != own && path.ends_with(division);
     if (keep) {
       auto header = read_header(path);
-      keep = header && (header->is_null() || same_job(*header, meaning));
+      keep = header && (header->is_null() || check_header(*header, meaning, path));
     }
     if (!keep && ::unlink(path.c_str()) != 0) {
       return util::Error{util::Exit::io, "IO_ERROR",

@@ -42,20 +42,27 @@ class RunLock {
   int descriptor_;
 };
 
-// What the journals of a folder say about a plan.
+// What the journals of a folder say about a shard of a plan.
 struct Done {
-  std::vector<bool> views;             // by view, of the whole job
+  std::uint64_t begin = 0;             // the shard's first view
+  std::vector<bool> views;             // of the shard, from `begin`
   std::vector<bool> scenes_described;  // this shard's journal has the scene's line
-  std::uint64_t count = 0;             // of views that are done, in the whole job
+  std::uint64_t count = 0;             // of the shard's views that are done
   std::uint64_t broken_lines = 0;
   bool has_journal = false;  // this shard's own, with its header
-  bool clean = true;         // every journal ends in good order: nothing was killed
+  bool clean = true;         // every journal that was read ends in good order: nothing was killed
+
+  bool has(std::uint64_t view) const { return views[view - begin]; }
 };
 
-// Reads every journal; a view counts when its files are there with the sizes that its line says.
-// A usage error where a journal belongs to another job than `meaning`: says what changed.
+// Reads this shard's journal and those of other divisions of the job; of the other shards of this
+// division, which hold none of its views, the first line of one. A view counts when its files are
+// there with the sizes that its line says. A usage error where a journal belongs to another job
+// than `meaning`: says what changed.
 util::Result<Done> read_done(const Plan& plan, const nlohmann::ordered_json& meaning,
                              const Shard& shard);
+// The same error, from the first line of every journal.
+util::Result<void> check_same_job(const Plan& plan, const nlohmann::ordered_json& meaning);
 
 // --force: forgets this shard's journal, and those of other jobs or divisions.
 util::Result<void> forget(const Plan& plan, const nlohmann::ordered_json& meaning,
