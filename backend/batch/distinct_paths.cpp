@@ -26,7 +26,7 @@ bool may_hold(Field field, char c) {
          c == '.' || c == '+';
 }
 
-bool all_differ(const std::vector<std::string>& names) {
+bool all_differ(std::span<const std::string> names) {
   std::unordered_set<std::string_view> seen(names.begin(), names.end());
   return seen.size() == names.size();
 }
@@ -63,31 +63,34 @@ class Proof {
     }
     if (space_.frames.size() > 1 && !has(Field::frame)) return false;
     if (has(Field::camera_index)) return true;
-    return std::all_of(space_.cameras.begin(), space_.cameras.end(), [&](const auto* names) {
-      return names->size() < 2 || (has(Field::camera) && all_differ(*names));
+    return std::all_of(space_.cameras.begin(), space_.cameras.end(), [&](const CameraList& list) {
+      return list.size() < 2 || (has(Field::camera) && list.paths_surely_differ());
     });
   }
 
   // The length of all values of a field, where they have one.
   std::optional<std::size_t> length(const Piece& piece) const {
     if (piece.field == Field::literal) return piece.literal.size();
-    if (piece.field == Field::aov) return common_length({&aovs_});
-    if (piece.field == Field::scene) return common_length({&space_.scenes});
-    if (piece.field == Field::camera) return common_length(space_.cameras);
+    if (piece.field == Field::aov) return common_length(aovs_);
+    if (piece.field == Field::scene) return common_length(space_.scenes);
+    if (piece.field == Field::camera) return camera_length();
     const std::size_t longest = std::to_string(last_number(piece.field) / piece.divisor).size();
     if (static_cast<std::size_t>(piece.width) >= longest) return piece.width;
     return longest == 1 ? std::optional<std::size_t>(1) : std::nullopt;
   }
-  static std::optional<std::size_t> common_length(
-      const std::vector<const std::vector<std::string>*>& lists) {
-    std::optional<std::size_t> common;
-    for (const auto* list : lists) {
-      for (const std::string& name : *list) {
-        if (common && *common != name.size()) return std::nullopt;
-        common = name.size();
-      }
+  static std::optional<std::size_t> common_length(std::span<const std::string> names) {
+    for (const std::string& name : names) {
+      if (name.size() != names.front().size()) return std::nullopt;
     }
-    return common;
+    if (names.empty()) return std::nullopt;
+    return names.front().size();
+  }
+  std::optional<std::size_t> camera_length() const {
+    const auto length = space_.cameras.front().path_length();
+    for (const CameraList& list : space_.cameras) {
+      if (list.path_length() != length) return std::nullopt;
+    }
+    return length;
   }
   std::int64_t last_number(Field field) const {
     if (field == Field::view) return static_cast<std::int64_t>(space_.views) - 1;
@@ -96,8 +99,8 @@ class Proof {
       return space_.frames.empty() ? 0
                                    : *std::max_element(space_.frames.begin(), space_.frames.end());
     }
-    std::size_t most = 1;
-    for (const auto* names : space_.cameras) most = std::max(most, names->size());
+    std::uint64_t most = 1;
+    for (const CameraList& list : space_.cameras) most = std::max(most, list.size());
     return static_cast<std::int64_t>(most) - 1;
   }
 
@@ -121,8 +124,8 @@ class Proof {
     }
     std::vector<std::uint64_t> hashes;
     for (std::size_t scene = 0; scene < space_.scenes.size(); ++scene) {
-      const auto& cameras = space_.cameras_of(scene);
-      for (std::size_t camera = 0; camera < cameras.size(); ++camera) {
+      const CameraList& cameras = space_.cameras_in(scene);
+      for (std::uint64_t camera = 0; camera < cameras.size(); ++camera) {
         std::uint64_t hash = kHashStart;
         for (std::size_t i = begin; i < end; ++i) {
           hash = hash_text(text(pieces_[i], scene, camera), hash);
@@ -133,10 +136,10 @@ class Proof {
     std::sort(hashes.begin(), hashes.end());
     return std::adjacent_find(hashes.begin(), hashes.end()) == hashes.end();
   }
-  std::string text(const Piece& piece, std::size_t scene, std::size_t camera) const {
+  std::string text(const Piece& piece, std::size_t scene, std::uint64_t camera) const {
     PathFields fields;
     fields.scene = space_.scenes[scene];
-    fields.camera = space_.cameras_of(scene)[camera];
+    fields.camera = space_.cameras_in(scene).path_name(camera);
     fields.scene_index = scene;
     fields.camera_index = camera;
     return OutputPattern::path(piece, fields);

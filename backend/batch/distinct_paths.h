@@ -3,27 +3,30 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <string>
 #include <vector>
 
+#include "backend/batch/camera_list.h"
 #include "backend/batch/output_pattern.h"
 
 namespace octrace::batch {
 
 // What the fields of a job's patterns stand for.
 struct PathSpace {
-  std::vector<std::string> scenes;                       // by scene, made by path_name()
-  std::vector<const std::vector<std::string>*> cameras;  // by scene; or one for all
-  std::vector<std::int64_t> frames;                      // empty: frame 0 alone
+  std::span<const std::string> scenes;  // by scene, made by path_name()
+  std::span<const CameraList> cameras;
+  std::span<const std::uint32_t> cameras_of;  // by scene, of `cameras`; empty: the first for all
+  std::span<const std::int64_t> frames;       // empty: frame 0 alone
   std::uint64_t views = 0;
 
-  const std::vector<std::string>& cameras_of(std::size_t scene) const {
-    return *cameras[cameras.size() == 1 ? 0 : scene];
+  const CameraList& cameras_in(std::size_t scene) const {
+    return cameras[cameras_of.empty() ? 0 : cameras_of[scene]];
   }
 };
 
 // True: no two views, nor two of `aovs`, share a path. False: they may. Costs no more than a look
-// at each scene's cameras.
+// at each pair of a scene and a camera, and with most patterns less.
 bool surely_distinct(const OutputPattern& pattern, const std::vector<std::string>& aovs,
                      const PathSpace& space);
 

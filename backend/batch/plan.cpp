@@ -41,14 +41,14 @@ std::string common_folder(const std::string& a, const std::string& b) {
 Result<Plan> Plan::make(Job job, const std::string& base, const util::Limits& limits) {
   Plan plan;
   plan.job_ = std::move(job);
-  if (auto found = plan.find_cameras(limits); !found) return found.error();
+  plan.find_cameras(limits);
   for (const JobScene& scene : plan.job_.scenes) {
     plan.scene_names_.push_back(path_name(scene.name));
   }
   const std::uint64_t frames = std::max<std::uint64_t>(1, plan.job_.frames.size());
   plan.first_view_ = {0};
   for (std::size_t i = 0; i < plan.job_.scenes.size(); ++i) {
-    const std::uint64_t cameras = plan.cameras_of(i).cameras.size();
+    const std::uint64_t cameras = plan.cameras_of(i).size();
     const std::uint64_t left = limits.max_views - plan.first_view_.back();
     if (cameras > left / frames) return too_many_views(plan.job_, limits.max_views);
     plan.first_view_.push_back(plan.first_view_.back() + cameras * frames);
@@ -58,61 +58,51 @@ Result<Plan> Plan::make(Job job, const std::string& base, const util::Limits& li
   return plan;
 }
 
-Result<void> Plan::find_cameras(const util::Limits& limits) {
-  const auto add = [](SceneCameras& to, std::size_t entry, std::uint64_t index, std::string name) {
-    to.cameras.push_back({entry, index});
-    to.path_names.push_back(path_name(name));
-    to.names.push_back(std::move(name));
-  };
-  const auto fill = [&](SceneCameras& to, const std::vector<std::string>* in_scene) -> bool {
+void Plan::find_cameras(const util::Limits& limits) {
+  const auto list = [&](const std::vector<std::string>* in_scene) {
+    CameraList all;
     for (std::size_t e = 0; e < job_.cameras.size(); ++e) {
-      if (to.cameras.size() > limits.max_views) return false;
       const CameraEntry& entry = job_.cameras[e];
       if (const auto* given = std::get_if<GivenCameras>(&entry)) {
-        for (std::size_t i = 0; i < given->cameras.size(); ++i) {
-          add(to, e, i, given->cameras[i].name);
-        }
+        std::vector<std::string> names;
+        for (const scene::Camera& camera : given->cameras) names.push_back(camera.name);
+        all.add(e, std::move(names));
       } else if (const auto* orbit = std::get_if<OrbitCameras>(&entry)) {
-        if (orbit->n > limits.max_views) return false;
-        for (std::uint64_t i = 0; i < orbit->n; ++i) add(to, e, i, orbit_name(*orbit, i));
+        all.add_numbered(e, orbit->name, orbit->n);
       } else if (const auto* named = std::get_if<NamedCamera>(&entry)) {
         if (const auto* name = std::get_if<std::string>(&named->which)) {
-          add(to, e, 0, *name);
+          all.add(e, {*name});
           continue;
         }
         const auto index = static_cast<std::size_t>(std::get<std::int64_t>(named->which));
         const bool known = in_scene != nullptr && index < in_scene->size();
-        add(to, e, 0, known ? (*in_scene)[index] : fmt::format("camera {}", index));
+        all.add(e, {known ? (*in_scene)[index] : fmt::format("camera {}", index)});
       } else if (in_scene == nullptr || in_scene->empty()) {
-        add(to, e, 0, "framed");
+        all.add(e, {"framed"});
       } else {
-        for (std::size_t i = 0; i < in_scene->size(); ++i) add(to, e, i, (*in_scene)[i]);
+        all.add(e, *in_scene);
       }
     }
-    return true;
+    return all;
   };
   if (std::none_of(job_.cameras.begin(), job_.cameras.end(), depends_on_scene)) {
-    if (!fill(common_, nullptr)) return too_many_views(job_, limits.max_views);
-    return {};
+    cameras_.push_back(list(nullptr));
+    return;
   }
-  std::map<std::pair<std::string, int>, std::size_t> seen;  // the same file may come many times
+  // The same file may come many times.
+  std::map<std::pair<std::string, int>, std::uint32_t> seen;
   for (const JobScene& scene : job_.scenes) {
-    const auto [at, is_new] =
-        seen.try_emplace({scene.source, scene.scene.value_or(-1)}, own_.size());
-    if (!is_new) {
-      own_.push_back(own_[at->second]);
-      continue;
-    }
-    SceneCameras cameras;
+    const auto [at, is_new] = seen.try_emplace({scene.source, scene.scene.value_or(-1)},
+                                               static_cast<std::uint32_t>(cameras_.size()));
+    cameras_of_.push_back(at->second);
+    if (!is_new) continue;
     const auto names = probe_cameras(scene, limits);
-    if (!fill(cameras, names ? &*names : nullptr)) return too_many_views(job_, limits.max_views);
-    own_.push_back(std::move(cameras));
+    cameras_.push_back(list(names ? &*names : nullptr));
   }
-  return {};
 }
 
-const Plan::SceneCameras& Plan::cameras_of(std::size_t scene) const {
-  return own_.empty() ? common_ : own_[scene];
+const CameraList& Plan::cameras_of(std::size_t scene) const {
+  return cameras_[cameras_of_.empty() ? 0 : cameras_of_[scene]];
 }
 
 void Plan::choose_folder(const std::string& base) {
@@ -138,7 +128,7 @@ View Plan::view(std::uint64_t index) const {
   view.index = index;
   view.scene = static_cast<std::size_t>(after - first_view_.begin()) - 1;
   const std::uint64_t rest = index - first_view_[view.scene];
-  const std::uint64_t cameras = cameras_of(view.scene).cameras.size();
+  const std::uint64_t cameras = cameras_of(view.scene).size();
   view.camera = rest % cameras;
   if (!job_.frames.empty()) {
     view.frame = job_.frames[static_cast<std::size_t>(rest / cameras)];
@@ -148,17 +138,17 @@ View Plan::view(std::uint64_t index) const {
 }
 
 PlannedCamera Plan::camera(const View& view) const {
-  return cameras_of(view.scene).cameras[view.camera];
+  return cameras_of(view.scene).at(view.camera);
 }
 
-const std::string& Plan::camera_name(const View& view) const {
-  return cameras_of(view.scene).names[view.camera];
+std::string Plan::camera_name(const View& view) const {
+  return cameras_of(view.scene).name(view.camera);
 }
 
 PathFields Plan::fields(const View& view) const {
   PathFields fields;
   fields.scene = scene_names_[view.scene];
-  fields.camera = cameras_of(view.scene).path_names[view.camera];
+  fields.camera = cameras_of(view.scene).path_name(view.camera);
   fields.frame = view.frame;
   fields.view = view.index;
   fields.scene_index = view.scene;
@@ -206,12 +196,7 @@ render::AovSet Plan::needed_aovs() const {
 }
 
 bool Plan::paths_surely_differ() const {
-  PathSpace space{scene_names_, {}, job_.frames, views()};
-  if (own_.empty()) {
-    space.cameras = {&common_.path_names};
-  } else {
-    for (const SceneCameras& cameras : own_) space.cameras.push_back(&cameras.path_names);
-  }
+  const PathSpace space{scene_names_, cameras_, cameras_of_, job_.frames, views()};
   for (std::size_t i = 0; i < job_.outputs.size(); ++i) {
     const JobOutput& output = job_.outputs[i];
     std::vector<std::string> aovs;

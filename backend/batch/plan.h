@@ -6,15 +6,10 @@
 #include <string>
 #include <vector>
 
+#include "backend/batch/camera_list.h"
 #include "backend/batch/job.h"
 
 namespace octrace::batch {
-
-// One camera of a scene: its place in the job's entries.
-struct PlannedCamera {
-  std::size_t entry = 0;    // of Job::cameras
-  std::uint64_t index = 0;  // within the entry
-};
 
 struct View {
   std::uint64_t index = 0;
@@ -42,7 +37,7 @@ class Plan {
   std::pair<std::uint64_t, std::uint64_t> part(const Shard& shard) const;
   View view(std::uint64_t index) const;
   PlannedCamera camera(const View& view) const;
-  const std::string& camera_name(const View& view) const;
+  std::string camera_name(const View& view) const;
 
   // The output folder: "" or ending in '/'. Paths of files are relative to it.
   const std::string& folder() const { return folder_; }
@@ -61,25 +56,20 @@ class Plan {
   nlohmann::ordered_json meaning(const util::Limits& limits) const;
 
  private:
-  struct SceneCameras {
-    std::vector<PlannedCamera> cameras;
-    std::vector<std::string> names;       // as the scene or the job calls them
-    std::vector<std::string> path_names;  // made by path_name()
-  };
-  util::Result<void> find_cameras(const util::Limits& limits);
+  void find_cameras(const util::Limits& limits);
   void choose_folder(const std::string& base);
   bool paths_surely_differ() const;  // false: they have to be compared
   util::Result<void> check_paths() const;
-  const SceneCameras& cameras_of(std::size_t scene) const;
+  const CameraList& cameras_of(std::size_t scene) const;
   PathFields fields(const View& view) const;
 
   Job job_;
   std::string folder_;
   std::vector<std::string> patterns_folder_;  // of each output, what comes before its pattern
-  SceneCameras common_;                       // where no entry depends on the scene
-  std::vector<SceneCameras> own_;             // by scene; empty: common_ serves all
-  std::vector<std::string> scene_names_;      // made by path_name()
-  std::vector<std::uint64_t> first_view_;     // by scene, and the end
+  std::vector<CameraList> cameras_;
+  std::vector<std::uint32_t> cameras_of_;  // by scene, of cameras_; empty: the first serves all
+  std::vector<std::string> scene_names_;   // made by path_name()
+  std::vector<std::uint64_t> first_view_;  // by scene, and the end
 };
 
 }  // namespace octrace::batch

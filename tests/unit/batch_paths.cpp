@@ -19,26 +19,33 @@ struct World {
   std::vector<std::int64_t> frames;
   std::vector<std::string> aovs;
 
-  PathSpace space() const {
-    PathSpace space{scenes, {}, frames, 0};
-    for (const auto& names : cameras) space.cameras.push_back(&names);
-    const std::uint64_t count = std::max<std::size_t>(1, frames.size());
-    for (std::size_t s = 0; s < scenes.size(); ++s) {
-      space.views += count * space.cameras_of(s).size();
+  std::vector<batch::CameraList> lists;
+  std::vector<std::uint32_t> list_of;
+
+  PathSpace space() {
+    lists.clear();
+    list_of.clear();
+    for (const auto& names : cameras) {
+      lists.emplace_back().add(0, names);
+      if (cameras.size() > 1) list_of.push_back(static_cast<std::uint32_t>(list_of.size()));
     }
+    PathSpace space{scenes, lists, list_of, frames, 0};
+    const std::uint64_t count = std::max<std::size_t>(1, frames.size());
+    for (std::size_t s = 0; s < scenes.size(); ++s)
+      space.views += count * space.cameras_in(s).size();
     return space;
   }
 };
 
-std::vector<std::string> all_paths(const OutputPattern& pattern, const World& world) {
+std::vector<std::string> all_paths(const OutputPattern& pattern, World& world) {
   std::vector<std::string> paths;
   const PathSpace space = world.space();
   batch::PathFields fields;
   for (std::size_t s = 0; s < world.scenes.size(); ++s) {
     for (std::size_t f = 0; f < std::max<std::size_t>(1, world.frames.size()); ++f) {
-      for (std::size_t c = 0; c < space.cameras_of(s).size(); ++c) {
+      for (std::size_t c = 0; c < space.cameras_in(s).size(); ++c) {
         fields.scene = world.scenes[s];
-        fields.camera = space.cameras_of(s)[c];
+        fields.camera = space.cameras_in(s).path_name(c);
         fields.frame = world.frames.empty() ? 0 : world.frames[f];
         fields.scene_index = s;
         fields.camera_index = c;
@@ -129,6 +136,41 @@ TEST(DistinctPaths, NoProofIsWrong) {
     }
   }
   EXPECT_GT(proved, refused / 20);  // the test is about something
+}
+
+TEST(CameraList, CountedNames) {
+  batch::CameraList list;
+  list.add(0, {"x", "y"});
+  list.add_numbered(3, "ring", 1000000);
+  list.add_numbered(4, "b", 2);
+  EXPECT_EQ(list.size(), 1000004u);
+  EXPECT_EQ(list.name(1), "y");
+  EXPECT_EQ(list.name(2), "ring_000000");
+  EXPECT_EQ(list.name(1000001), "ring_999999");
+  EXPECT_EQ(list.name(1000003), "b_001");
+  EXPECT_EQ(list.at(1000001).entry, 3u);
+  EXPECT_EQ(list.at(1000001).index, 999999u);
+  EXPECT_EQ(list.at(1000003).index, 1u);
+  EXPECT_TRUE(list.paths_surely_differ());
+  EXPECT_FALSE(list.path_length());
+  const auto differ = [](std::vector<std::string> names, std::vector<std::string> counted) {
+    batch::CameraList some;
+    some.add(0, std::move(names));
+    for (const std::string& name : counted) some.add_numbered(0, name, 20);
+    return some.paths_surely_differ();
+  };
+  EXPECT_FALSE(differ({"x", "x"}, {}));
+  EXPECT_FALSE(differ({"a b", "a:b"}, {}));  // both are a_b in a path
+  EXPECT_FALSE(differ({"ring_007"}, {"ring"}));
+  EXPECT_FALSE(differ({}, {"ring", "ring"}));
+  EXPECT_FALSE(differ({}, {"r", "r_0"}));
+  EXPECT_TRUE(differ({"ring"}, {"ring", "rin"}));
+  EXPECT_FALSE(differ({}, {std::string(97, 'n')}));  // the number is cut off
+  EXPECT_TRUE(differ({}, {std::string(96, 'n')}));
+  batch::CameraList even;
+  even.add_numbered(0, "ring", 50);
+  even.add(1, {"ring_abc"});
+  EXPECT_EQ(even.path_length(), 8u);
 }
 
 TEST(DistinctPaths, Apart) {
