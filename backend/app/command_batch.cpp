@@ -105,6 +105,12 @@ Result<util::Exit> dry_run(const batch::Plan& plan, const BatchRequest& request)
       ++there;
       continue;
     }
+    if (plan.job().pack) {
+      if (index == plan.views_of_pack(plan.pack_of(index)).first) {
+        fmt::print("{}\n", plan.pack_path(plan.pack_of(index)));
+      }
+      continue;
+    }
     for (const batch::Output& file : plan.files(plan.view(index))) fmt::print("{}\n", file.path);
   }
   util::log_info(fmt::format("{} views of {} scenes in this run, {} of them done; nothing was made",

@@ -70,8 +70,9 @@ Result<Submission> plan_submission(const SubmitRequest& request) {
   if (!request.out.empty()) {
     submission.job.out = std::filesystem::absolute(request.out).lexically_normal().string();
   }
-  // More tasks than views would have nothing to do.
-  submission.job.tasks = std::min(request.tasks, std::max<std::uint64_t>(plan->views(), 1));
+  // More tasks than views, or packs, would have nothing to do.
+  const std::uint64_t pieces = plan->job().pack ? plan->packs() : plan->views();
+  submission.job.tasks = std::min(request.tasks, std::max<std::uint64_t>(pieces, 1));
   if (request.device) submission.job.options = {"--device", *request.device};
   submission.state = batch::state_folder(
       std::filesystem::absolute(plan->folder() + ".").lexically_normal().string());

@@ -252,10 +252,10 @@ Result<Job> parse_job(const Json& root, const std::string& path, const util::Lim
   job.folder = slash == std::string::npos ? "" : path.substr(0, slash + 1);
   const JsonAt json(root, path, util::Exit::usage);
   if (auto ok = json.object(
-          {"version", "scenes",      "cameras",        "frames",     "fps",        "animation",
-           "variant", "size",        "aovs",           "output",     "device",     "spp",
-           "seed",    "sky",         "cull",           "alpha",      "background", "objects",
-           "masks",   "depth_scale", "missing_images", "compression"},
+          {"version", "scenes",      "cameras",        "frames",      "fps",        "animation",
+           "variant", "size",        "aovs",           "output",      "device",     "spp",
+           "seed",    "sky",         "cull",           "alpha",       "background", "objects",
+           "masks",   "depth_scale", "missing_images", "compression", "pack"},
           {"version", "scenes", "size", "aovs", "output"});
       !ok)
     return ok.error();
@@ -278,6 +278,16 @@ Result<Job> parse_job(const Json& root, const std::string& path, const util::Lim
   auto outputs = parse_outputs(json.at("output"), *words, job);
   if (!outputs) return outputs.error();
   job.outputs = std::move(*outputs);
+  if (json.has("pack")) {
+    auto pack = parse_pack(json.at("pack"));
+    if (!pack) return pack.error();
+    job.pack = std::move(*pack);
+    for (const JobOutput& output : job.outputs) {
+      const std::string& name = output.pattern.text();
+      if (!name.starts_with('/') && !name.starts_with("..")) continue;
+      return json.at("output").error("in a \"pack\" names are relative and stay in it");
+    }
+  }
   if (auto ok = parse_looks(json, job, limits); !ok) return ok.error();
   if (json.has("device")) {
     if (auto ok = parse_device_member(json.at("device"), job); !ok) return ok.error();

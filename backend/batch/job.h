@@ -50,6 +50,12 @@ struct JobOutput {
   std::vector<Output> files;           // one, or one a plane where the pattern has {aov}; no paths
 };
 
+// Views go into tar files, so many into each, instead of files of their own.
+struct JobPack {
+  OutputPattern path;
+  std::uint64_t views = 0;
+};
+
 struct Job {
   std::string file, folder;  // folder: "" or ends in '/'
   std::vector<JobScene> scenes;
@@ -61,6 +67,7 @@ struct Job {
   ImageSize size;
   render::AovSet aovs;
   std::vector<JobOutput> outputs;
+  std::optional<JobPack> pack;  // outputs are names in it
   std::string device = "auto", compression = "zip";
   kernels::RenderParams params;
   double depth_scale = 1000.0;
@@ -79,6 +86,8 @@ util::Result<std::vector<CameraEntry>> parse_cameras(const JsonAt& list, const J
 util::Result<std::vector<JobOutput>> parse_outputs(const JsonAt& json,
                                                    const std::vector<std::string>& aovs,
                                                    const Job& job);
+
+util::Result<JobPack> parse_pack(const JsonAt& json);
 
 std::string path_beside(const std::string& folder, const std::string& path);
 

@@ -1,6 +1,7 @@
 // A job's outputs: which files a view has, and which planes each holds.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
 
 #include "backend/batch/job.h"
@@ -59,6 +60,9 @@ Result<JobOutput> parse_output(const JsonAt& json, const std::vector<std::string
   // "out//a" and "out/./a" are the same place.
   auto pattern = OutputPattern::parse(std::filesystem::path(*text).lexically_normal().string());
   if (!pattern) return path.error(pattern.error().message);
+  if (pattern->has(OutputPattern::Field::pack)) {
+    return path.error("{pack} is for the path of \"pack\"");
+  }
   JobOutput output{std::move(*pattern), words.words, {}};
   const auto add_file = [&](const std::optional<render::AovSet>& named) -> Result<void> {
     // A name before the tail: ".exr" alone would be a hidden file without extension.
@@ -83,6 +87,27 @@ Result<JobOutput> parse_output(const JsonAt& json, const std::vector<std::string
 }
 
 }  // namespace
+
+Result<JobPack> parse_pack(const JsonAt& json) {
+  if (auto ok = json.object({"path", "views"}, {"path", "views"}); !ok) return ok.error();
+  const JsonAt path = json.at("path");
+  auto text = path.text();
+  if (!text) return text.error();
+  auto pattern = OutputPattern::parse(std::filesystem::path(*text).lexically_normal().string());
+  if (!pattern) return path.error(pattern.error().message);
+  using Field = OutputPattern::Field;
+  const bool others = std::any_of(
+      pattern->pieces().begin(), pattern->pieces().end(), [](const OutputPattern::Piece& piece) {
+        return piece.field != Field::literal && piece.field != Field::pack;
+      });
+  if (others || !pattern->has(Field::pack)) {
+    return path.error("needs the field {pack}, the pack's number, and takes no other");
+  }
+  if (!pattern->tail().ends_with(".tar")) return path.needs("a path that ends in .tar");
+  auto views = json.at("views").integer(1, 1'000'000'000);
+  if (!views) return views.error();
+  return JobPack{std::move(*pattern), static_cast<std::uint64_t>(*views)};
+}
 
 Result<std::vector<JobOutput>> parse_outputs(const JsonAt& json,
                                              const std::vector<std::string>& aovs, const Job& job) {

@@ -87,6 +87,7 @@ ordered_json Plan::meaning(const util::Limits& limits) const {
   json["size"] = {job_.size.width, job_.size.height};
   json["output"] = ordered_json::array();
   for (const JobOutput& output : job_.outputs) json["output"].push_back(describe(output));
+  if (job_.pack) json["pack"] = {{"path", job_.pack->path.text()}, {"views", job_.pack->views}};
   const kernels::RenderParams& params = job_.params;
   json["spp"] = params.spp;
   json["seed"] = params.seed;

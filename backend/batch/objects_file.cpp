@@ -32,6 +32,12 @@ ordered_json scene_list(const SceneLines& scenes) {
   return list;
 }
 
+ordered_json object_entry(const ordered_json& object) {
+  return {{"object_id", object.at("id")},
+          {"pixels", object.at("pixels")},
+          {"bbox", coco_box(object.at("box"))}};
+}
+
 util::Error invalid(const ordered_json::exception& exception) {
   return {util::Exit::invalid_input, "INVALID_RECORD", exception.what(), "", ""};
 }
@@ -41,6 +47,19 @@ util::Error invalid(const ordered_json::exception& exception) {
 ordered_json coco_box(const ordered_json& box) {
   const std::int64_t left = box.at(0), top = box.at(1), right = box.at(2), bottom = box.at(3);
   return {left, top, right - left + 1, bottom - top + 1};
+}
+
+util::Result<ordered_json> object_entries(const ordered_json& view_line) {
+  try {
+    ordered_json list = ordered_json::array();
+    for (const ordered_json& object : view_line.at("objects")) {
+      list.push_back(object_entry(object));
+      if (object.contains("rle")) list.back()["rle"] = object["rle"];
+    }
+    return list;
+  } catch (const ordered_json::exception& exception) {
+    return invalid(exception);
+  }
 }
 
 util::Result<ObjectsFile> ObjectsFile::create(const std::string& path, const SceneLines& scenes) {
@@ -65,9 +84,7 @@ util::Result<void> ObjectsFile::add(const ordered_json& view_line) {
                           {"frame", view_line.at("frame")},
                           {"objects", ordered_json::array()}};
     for (const ordered_json& object : view_line.at("objects")) {
-      entry["objects"].push_back({{"object_id", object.at("id")},
-                                  {"pixels", object.at("pixels")},
-                                  {"bbox", coco_box(object.at("box"))}});
+      entry["objects"].push_back(object_entry(object));
     }
     return file_.add(entry);
   } catch (const ordered_json::exception& exception) {

@@ -24,6 +24,9 @@ class ObjectsFile {
   JsonListFile file_;
 };
 
+// The objects of a view: [{"object_id", "pixels", "bbox"}], and "rle" where the line has it.
+util::Result<nlohmann::ordered_json> object_entries(const nlohmann::ordered_json& view_line);
+
 // First column, first row, width, height, of a record's first and last column and row.
 nlohmann::ordered_json coco_box(const nlohmann::ordered_json& box);
 

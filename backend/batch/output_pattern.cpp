@@ -62,13 +62,14 @@ util::Result<OutputPattern::Piece> OutputPattern::parse_field(std::string_view t
     Field field;
     bool number;
   };
-  static constexpr std::array<Name, 7> kNames = {{{"scene", Field::scene, false},
+  static constexpr std::array<Name, 8> kNames = {{{"scene", Field::scene, false},
                                                   {"camera", Field::camera, false},
                                                   {"frame", Field::frame, true},
                                                   {"view", Field::view, true},
                                                   {"scene_index", Field::scene_index, true},
                                                   {"camera_index", Field::camera_index, true},
-                                                  {"aov", Field::aov, false}}};
+                                                  {"aov", Field::aov, false},
+                                                  {"pack", Field::pack, true}}};
   const auto wrong = [&](std::string_view what) {
     return util::Error{util::Exit::usage, "", fmt::format("{{{}}}: {}", text, what), "", ""};
   };
@@ -166,13 +167,15 @@ std::string OutputPattern::path(const Piece& piece, const PathFields& fields) {
       return number(fields.scene_index);
     case Field::camera_index:
       return number(fields.camera_index);
+    case Field::pack:
+      return number(fields.pack);
   }
   return {};
 }
 
-bool OutputPattern::has_aov() const {
+bool OutputPattern::has(Field field) const {
   return std::any_of(pieces_.begin(), pieces_.end(),
-                     [](const Piece& piece) { return piece.field == Field::aov; });
+                     [&](const Piece& piece) { return piece.field == field; });
 }
 
 std::string OutputPattern::folder() const {

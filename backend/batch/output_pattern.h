@@ -14,12 +14,12 @@ namespace octrace::batch {
 struct PathFields {
   std::string scene, camera, aov;
   std::int64_t frame = 0;
-  std::uint64_t view = 0, scene_index = 0, camera_index = 0;
+  std::uint64_t view = 0, scene_index = 0, camera_index = 0, pack = 0;
 };
 
 class OutputPattern {
  public:
-  enum class Field { literal, scene, camera, frame, view, scene_index, camera_index, aov };
+  enum class Field { literal, scene, camera, frame, view, scene_index, camera_index, aov, pack };
   struct Piece {
     Field field = Field::literal;
     std::string literal;
@@ -32,7 +32,8 @@ class OutputPattern {
 
   std::string path(const PathFields& fields) const;
   static std::string path(const Piece& piece, const PathFields& fields);
-  bool has_aov() const;
+  bool has_aov() const { return has(Field::aov); }
+  bool has(Field field) const;
   std::string folder() const;     // up to the last '/' before the first field; may be empty
   std::string_view tail() const;  // the text after the last field: it holds the extension
   const std::string& text() const { return text_; }

@@ -106,6 +106,12 @@ const CameraList& Plan::cameras_of(std::size_t scene) const {
 }
 
 void Plan::choose_folder(const std::string& base) {
+  if (job_.pack) {
+    patterns_folder_.resize(job_.outputs.size());
+    pack_folder_ = job_.pack->path.text().starts_with('/') ? "" : base;
+    folder_ = pack_folder_ + job_.pack->path.folder();
+    return;
+  }
   for (const JobOutput& output : job_.outputs) {
     const bool absolute = output.pattern.text().starts_with('/');
     patterns_folder_.push_back(absolute ? "" : base);
@@ -117,7 +123,10 @@ void Plan::choose_folder(const std::string& base) {
 std::pair<std::uint64_t, std::uint64_t> Plan::part(const Shard& shard) const {
   // floor(I V / N) without overflow: V and N are below 2^32 by far in practice, 128 bits in theory.
   const auto bound = [&](std::uint64_t i) {
-    return static_cast<std::uint64_t>(static_cast<unsigned __int128>(views()) * i / shard.count);
+    const std::uint64_t all = job_.pack ? packs() : views();
+    const auto part =
+        static_cast<std::uint64_t>(static_cast<unsigned __int128>(all) * i / shard.count);
+    return job_.pack ? std::min(views(), part * job_.pack->views) : part;
   };
   return {bound(shard.index - 1), bound(shard.index)};
 }
@@ -139,6 +148,21 @@ View Plan::view(std::uint64_t index) const {
 
 PlannedCamera Plan::camera(const View& view) const {
   return cameras_of(view.scene).at(view.camera);
+}
+
+std::uint64_t Plan::packs() const {
+  return views() / job_.pack->views + (views() % job_.pack->views != 0 ? 1 : 0);
+}
+
+std::pair<std::uint64_t, std::uint64_t> Plan::views_of_pack(std::uint64_t pack) const {
+  const std::uint64_t begin = pack * job_.pack->views;
+  return {begin, std::min(views(), begin + job_.pack->views)};
+}
+
+std::string Plan::pack_path(std::uint64_t pack) const {
+  PathFields numbered;
+  numbered.pack = pack;
+  return pack_folder_ + job_.pack->path.path(numbered);
 }
 
 std::string Plan::camera_name(const View& view) const {
@@ -172,6 +196,7 @@ std::vector<Output> Plan::files(const View& view) const {
 
 Plan::Crowd Plan::largest_crowd() const {
   Crowd largest;
+  if (job_.pack) return {pack_folder_ + job_.pack->path.folder(), packs()};
   for (std::size_t i = 0; i < job_.outputs.size(); ++i) {
     const OutputPattern& pattern = job_.outputs[i].pattern;
     const auto& pieces = pattern.pieces();

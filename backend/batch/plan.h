@@ -33,7 +33,8 @@ class Plan {
   const Job& job() const { return job_; }
   std::uint64_t views() const { return first_view_.back(); }
   std::uint64_t first_view(std::size_t scene) const { return first_view_[scene]; }
-  // The views of a shard: [begin, end), a contiguous part; the parts differ by at most one in size.
+  // The views of a shard: [begin, end), a contiguous part; the parts differ by at most one view, or
+  // one pack, in size.
   std::pair<std::uint64_t, std::uint64_t> part(const Shard& shard) const;
   View view(std::uint64_t index) const;
   PlannedCamera camera(const View& view) const;
@@ -41,7 +42,13 @@ class Plan {
 
   // The output folder: "" or ending in '/'. Paths of files are relative to it.
   const std::string& folder() const { return folder_; }
-  std::vector<Output> files(const View& view) const;
+  std::vector<Output> files(const View& view) const;  // of a packed job: names in its pack
+
+  // Where the job has packs.
+  std::uint64_t packs() const;
+  std::uint64_t pack_of(std::uint64_t view) const { return view / job_.pack->views; }
+  std::pair<std::uint64_t, std::uint64_t> views_of_pack(std::uint64_t pack) const;  // [begin, end)
+  std::string pack_path(std::uint64_t pack) const;
   render::AovSet needed_aovs() const;
   // The folder that all of an output's files go into, and how many they are; 0: more than one
   // folder.
@@ -65,6 +72,7 @@ class Plan {
 
   Job job_;
   std::string folder_;
+  std::string pack_folder_;                   // what comes before the packs' pattern
   std::vector<std::string> patterns_folder_;  // of each output, what comes before its pattern
   std::vector<CameraList> cameras_;
   std::vector<std::uint32_t> cameras_of_;  // by scene, of cameras_; empty: the first serves all

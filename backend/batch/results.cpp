@@ -25,10 +25,13 @@ using util::Result;
 // What a first reading of all journals leaves.
 struct Gathered {
   JournalIndex index;
+  std::vector<bool> packed;  // by view, where the job has packs
   SceneLines scenes;
   std::map<std::int64_t, JobFailure> failures;  // by view, or -1 - scene
   std::uint64_t journals = 0;
   double seconds = 0.0, longest = 0.0;
+
+  bool has(std::uint64_t view) const { return packed.empty() ? index.has(view) : packed[view]; }
 };
 
 bool files_are_there(const std::string& folder, const ordered_json& line) {
@@ -41,8 +44,23 @@ bool files_are_there(const std::string& folder, const ordered_json& line) {
   return true;
 }
 
-Result<void> note(const ordered_json& line, Gathered& gathered) {
+void note_pack(const Plan& plan, const ordered_json& line, Gathered& gathered) {
+  const auto index = line.at("pack").get<std::uint64_t>();
+  if (!plan.job().pack || index >= plan.packs()) return;
+  std::error_code error;
+  const auto bytes = std::filesystem::file_size(plan.pack_path(index), error);
+  if (error || bytes != line.at("bytes").get<std::uint64_t>()) return;
+  const auto [begin, end] = plan.views_of_pack(index);
+  for (std::uint64_t view = begin; view < end; ++view) gathered.packed[view] = true;
+  for (const ordered_json& view : line.at("failed")) {
+    const auto failed = view.get<std::uint64_t>();
+    if (failed >= begin && failed < end) gathered.packed[failed] = false;
+  }
+}
+
+Result<void> note(const Plan& plan, const ordered_json& line, Gathered& gathered) {
   const std::string kind = line.at("kind");
+  if (kind == "pack") note_pack(plan, line, gathered);
   if (kind == "scene") {
     gathered.scenes[line.at("scene").get<std::uint64_t>()] = line;
   } else if (kind == "fail") {
@@ -62,12 +80,14 @@ Result<void> note(const ordered_json& line, Gathered& gathered) {
 }
 
 Result<Gathered> gather(const Plan& plan) {
-  Gathered gathered{JournalIndex(plan.views()), {}, {}, 0, 0.0, 0.0};
+  const bool packed = plan.job().pack.has_value();
+  Gathered gathered{JournalIndex(packed ? 0 : plan.views()), {}, {}, {}, 0, 0.0, 0.0};
+  if (packed) gathered.packed.resize(plan.views());
   const std::string folder = plan.folder();
   for (const std::string& path : journals_in(folder)) {
     auto added = gathered.index.add(
         path, [&](const ordered_json& line) { return files_are_there(folder, line); },
-        [&](const ordered_json& line) { return note(line, gathered); });
+        [&](const ordered_json& line) { return note(plan, line, gathered); });
     if (!added) return added.error();
     ++gathered.journals;
   }
@@ -78,15 +98,19 @@ Result<Gathered> gather(const Plan& plan) {
 class Files {
  public:
   Result<void> create(const Plan& plan, const SceneLines& scenes) {
-    auto cameras = CamerasFile::create(plan.folder() + "cameras.json");
-    if (!cameras) return cameras.error();
-    cameras_.emplace(std::move(*cameras));
+    // The packs hold what is known of each view.
+    const bool packed = plan.job().pack.has_value();
+    if (!packed) {
+      auto cameras = CamerasFile::create(plan.folder() + "cameras.json");
+      if (!cameras) return cameras.error();
+      cameras_.emplace(std::move(*cameras));
+    }
     if (plan.job().objects) {
       auto objects = ObjectsFile::create(plan.folder() + "objects.json", scenes);
       if (!objects) return objects.error();
       objects_.emplace(std::move(*objects));
     }
-    if (plan.job().coco_masks) {
+    if (plan.job().coco_masks && !packed) {
       auto annotations = AnnotationsFile::create(
           plan.folder() + "annotations.json", scenes,
           plan.job().coco_counts ? MaskCounts::uncompressed : MaskCounts::compressed);
@@ -103,7 +127,9 @@ class Files {
     return annotations_ ? annotations_->add(line) : Result<void>();
   }
   Result<void> finish() {
-    if (auto ok = cameras_->finish(); !ok) return ok;
+    if (cameras_) {
+      if (auto ok = cameras_->finish(); !ok) return ok;
+    }
     if (objects_) {
       if (auto ok = objects_->finish(); !ok) return ok;
     }
@@ -126,7 +152,7 @@ JobResults count(const Plan& plan, const Gathered& gathered) {
   std::vector<bool> scene_whole(plan.job().scenes.size(), true);
   for (std::size_t scene = 0; scene < scene_whole.size(); ++scene) {
     for (std::uint64_t view = plan.first_view(scene); view < plan.first_view(scene + 1); ++view) {
-      if (gathered.index.has(view)) {
+      if (gathered.has(view)) {
         ++results.done;
         continue;
       }
@@ -145,7 +171,7 @@ JobResults count(const Plan& plan, const Gathered& gathered) {
                                          : failure.scene < scene_whole.size();
     if (!known) continue;
     const bool made_since = failure.view >= 0
-                                ? gathered.index.has(static_cast<std::uint64_t>(failure.view))
+                                ? gathered.has(static_cast<std::uint64_t>(failure.view))
                                 : scene_whole[failure.scene];
     if (!made_since) results.failures.push_back(failure);
   }
@@ -186,7 +212,7 @@ Result<JobResults> write_job_results(const Plan& plan) {
   if (!gathered) return gathered.error();
   Files files;
   if (auto ok = files.create(plan, gathered->scenes); !ok) return ok.error();
-  for (std::uint64_t view = 0; view < plan.views(); ++view) {
+  for (std::uint64_t view = 0; view < plan.views() && !plan.job().pack; ++view) {
     if (!gathered->index.has(view)) continue;
     auto line = gathered->index.line(view);
     if (!line) return line.error();

@@ -148,6 +148,9 @@ void Run::run() {
     summary_.load_ms += load_timer.milliseconds();
     if (!opened) {
       if (stopping()) break;
+      for (std::uint64_t view = work[i].begin; view < work[i].end; ++view) {
+        if (!done_.has(view)) writer_.skip(view);
+      }
       writer_.fail({std::nullopt, work[i].scene, work[i].left, opened.error()});
       continue;
     }

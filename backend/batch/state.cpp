@@ -80,6 +80,20 @@ bool files_are_there(const Plan& plan, std::uint64_t view, const ordered_json& l
   return true;
 }
 
+// A pack that lacks views is made again as a whole.
+void note_pack(const Plan& plan, const ordered_json& line, Done& done) {
+  if (!plan.job().pack || !line.at("failed").empty()) return;
+  const auto index = line.at("pack").get<std::uint64_t>();
+  if (index >= plan.packs()) return;
+  const auto [begin, end] = plan.views_of_pack(index);
+  if (begin < done.begin || end > done.begin + done.views.size() || done.has(begin)) return;
+  std::error_code error;
+  const auto bytes = std::filesystem::file_size(plan.pack_path(index), error);
+  if (error || bytes != line.at("bytes").get<std::uint64_t>()) return;
+  for (std::uint64_t view = begin; view < end; ++view) done.views[view - done.begin] = true;
+  done.count += end - begin;
+}
+
 // The first line of a journal; null where it has none yet.
 Result<ordered_json> read_header(const std::string& path) {
   ordered_json header;
@@ -159,6 +173,10 @@ Result<Done> read_done(const Plan& plan, const ordered_json& meaning, const Shar
         const auto scene = line.at("scene").get<std::size_t>();
         if (scene < done.scenes_described.size()) done.scenes_described[scene] = true;
       }
+      if (kind == "pack") {
+        note_pack(plan, line, done);
+        return {};
+      }
       if (kind != "view") return {};
       const auto view = line.at("view").get<std::uint64_t>();
       if (view >= begin && view < end && !done.has(view) && files_are_there(plan, view, line)) {
@@ -214,8 +232,14 @@ void remove_leftovers(const Plan& plan, const Shard& shard) {
     if (folders.empty() || *folders.rbegin() != folder) folders.insert(std::move(folder));
   };
   const auto [begin, end] = plan.part(shard);
-  for (std::uint64_t index = begin; index < end; ++index) {
-    for (const Output& file : plan.files(plan.view(index))) add(file.path);
+  if (plan.job().pack && begin < end) {
+    for (std::uint64_t i = plan.pack_of(begin); i <= plan.pack_of(end - 1); ++i) {
+      add(plan.pack_path(i));
+    }
+  } else {
+    for (std::uint64_t index = begin; index < end; ++index) {
+      for (const Output& file : plan.files(plan.view(index))) add(file.path);
+    }
   }
   add(shard_summary_path(plan.folder(), shard));
   if (shard.count == 1) {

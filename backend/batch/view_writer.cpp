@@ -58,6 +58,15 @@ ViewWriter::ViewWriter(const Plan& plan, Journal& journal, unsigned threads,
       journal_(journal),
       report_(std::move(report)),
       most_framebuffers_(most_framebuffers(plan, threads)) {
+  if (plan.job().pack) {
+    auto scratch = ScratchFolder::create();
+    if (!scratch) {
+      outcome_.fatal = scratch.error();
+      return;
+    }
+    scratch_.emplace(std::move(*scratch));
+    packs_.emplace(plan, [this](const ordered_json& line) { return note(line); });
+  }
   const std::size_t writers = std::min<std::size_t>(threads, most_framebuffers_ - 1);
   for (std::size_t i = 0; i < writers; ++i) threads_.emplace_back([this] { work(); });
 }
@@ -100,6 +109,10 @@ void ViewWriter::finish() {
   }
   for (std::thread& thread : threads_) thread.join();
   threads_.clear();
+  if (!packs_) return;
+  const std::lock_guard lock(mutex_);
+  outcome_.done = packs_->done();
+  packs_.reset();
 }
 
 bool ViewWriter::stopped() const {
@@ -128,9 +141,10 @@ void ViewWriter::work() {
 
 void ViewWriter::write(TracedView& view) {
   const util::Timer timer;
+  std::vector<PackMember> members;
   auto files = [&]() -> Result<ordered_json> {
     try {
-      return write_files(view);
+      return write_files(view, members);
     } catch (const std::bad_alloc&) {
       return util::Error{util::Exit::limit, "", "out of memory", "", ""};
     }
@@ -158,7 +172,10 @@ void ViewWriter::write(TracedView& view) {
                                     image.height(), plan_.job().coco_masks));
   }
   line["ms"] = {view.trace_ms, write_ms};
-  if (auto noted = note(line); !noted) return stop(noted.error());
+  if (auto kept = keep(line, std::move(members)); !kept) {
+    if (util::interrupt_flag()) return;
+    return stop(kept.error());
+  }
   {
     const std::lock_guard lock(mutex_);
     ++outcome_.done;
@@ -168,7 +185,17 @@ void ViewWriter::write(TracedView& view) {
   report_();
 }
 
-Result<ordered_json> ViewWriter::write_files(const TracedView& view) const {
+// The files are complete: the journal says so, or the pack does once it is whole.
+Result<void> ViewWriter::keep(const ordered_json& line, std::vector<PackMember> members) {
+  if (!packs_) return note(line);
+  auto description = pack_description(line);
+  if (!description) return description.error();
+  members.push_back(std::move(*description));
+  return packs_->add(line.at("view").get<std::uint64_t>(), std::move(members));
+}
+
+Result<ordered_json> ViewWriter::write_files(const TracedView& view,
+                                             std::vector<PackMember>& members) const {
   // Without the camera, which the journal keeps: the image library never frees a text that it was
   // given once (OIIO::ustring), and a text for each view is 0.7 kB a view for ever.
   Metadata metadata = view_metadata(plan_.job().scenes[view.view.scene].source, view.camera);
@@ -177,7 +204,12 @@ Result<ordered_json> ViewWriter::write_files(const TracedView& view) const {
   Metadata exr_metadata = metadata;
   exr_metadata.emplace_back("compression", codec(plan_.job().compression));
   ordered_json files = ordered_json::array();
-  for (const Output& file : plan_.files(view.view)) {
+  for (Output& file : plan_.files(view.view)) {
+    const std::string name = file.path;
+    if (scratch_) {
+      file.path = fmt::format("{}{}-{}{}", scratch_->path(), view.view.index, members.size(),
+                              std::filesystem::path(name).extension().string());
+    }
     auto written = write_output(file, *view.framebuffer, plan_.job().depth_scale,
                                 file.kind == FileKind::exr ? exr_metadata : metadata);
     if (!written && written.error().exit == util::Exit::io &&
@@ -189,6 +221,13 @@ Result<ordered_json> ViewWriter::write_files(const TracedView& view) const {
                              file.kind == FileKind::exr ? exr_metadata : metadata);
     }
     if (!written) return written.error();
+    if (scratch_) {
+      auto content = take_file(file.path);
+      if (!content) return content.error();
+      files.push_back({{"path", name}, {"bytes", content->size()}});
+      members.push_back({name, std::move(*content)});
+      continue;
+    }
     std::error_code error;
     const auto bytes = std::filesystem::file_size(file.path, error);
     if (error) return util::Error{util::Exit::io, "IO_ERROR", error.message(), file.path, ""};
@@ -201,7 +240,13 @@ void ViewWriter::note_scene(const ordered_json& line) {
   if (auto noted = note(line); !noted) stop(noted.error());
 }
 
+void ViewWriter::skip(std::uint64_t view) {
+  if (!packs_) return;
+  if (auto skipped = packs_->skip(view); !skipped) stop(skipped.error());
+}
+
 void ViewWriter::fail(Failure failure) {
+  if (failure.view) skip(*failure.view);
   ordered_json line = {{"kind", "fail"}};
   if (failure.view) line["view"] = *failure.view;
   line["scene"] = failure.scene;

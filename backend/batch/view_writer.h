@@ -12,8 +12,10 @@
 #include <vector>
 
 #include "backend/batch/journal.h"
+#include "backend/batch/pack_writer.h"
 #include "backend/batch/plan.h"
 #include "backend/batch/runner.h"
+#include "backend/batch/scratch_folder.h"
 #include "backend/batch/state.h"
 #include "backend/render/framebuffer.h"
 #include "backend/util/process.h"
@@ -43,7 +45,8 @@ class ViewWriter {
 
   void note_scene(const nlohmann::ordered_json& line);  // before the scene's views
   void fail(Failure failure);
-  void finish();  // returns when all that was submitted is done
+  void skip(std::uint64_t view);  // of a scene that failed: a pack will lack it
+  void finish();                  // returns when all that was submitted is done
 
   bool stopped() const;
   struct Outcome {
@@ -57,12 +60,17 @@ class ViewWriter {
  private:
   void work();
   void write(TracedView& view);
-  util::Result<nlohmann::ordered_json> write_files(const TracedView& view) const;
+  // Of a packed job the files end up in `members`.
+  util::Result<nlohmann::ordered_json> write_files(const TracedView& view,
+                                                   std::vector<PackMember>& members) const;
+  util::Result<void> keep(const nlohmann::ordered_json& line, std::vector<PackMember> members);
   util::Result<void> note(const nlohmann::ordered_json& line);
   void stop(const util::Error& error);
 
   const Plan& plan_;
   Journal& journal_;
+  std::optional<ScratchFolder> scratch_;  // where members of packs are encoded
+  std::optional<PackWriter> packs_;
   std::function<void()> report_;
   std::size_t most_framebuffers_;
 
