@@ -23,6 +23,7 @@ using util::Result;
 struct SubmitRequest {
   std::string job, out, sbatch_args;
   std::optional<std::string> merge_args, device;
+  std::vector<std::string> given_limits;  // options with their values
   std::uint64_t tasks = 0;
   bool dry_run = false;
   util::Limits limits;
@@ -74,6 +75,7 @@ Result<Submission> plan_submission(const SubmitRequest& request) {
   const std::uint64_t pieces = plan->job().pack ? plan->packs() : plan->views();
   submission.job.tasks = std::min(request.tasks, std::max<std::uint64_t>(pieces, 1));
   if (request.device) submission.job.options = {"--device", *request.device};
+  submission.job.limits = request.given_limits;
   submission.state = batch::state_folder(
       std::filesystem::absolute(plan->folder() + ".").lexically_normal().string());
   submission.array_command = {"sbatch", "--parsable",
@@ -186,7 +188,14 @@ void declare_submit(CLI::App& program, Run& chosen) {
   add_limit_options(*slurm, request->limits);
   add_views_limit(*slurm, request->limits);
   add_verbosity_options(*slurm);
-  slurm->callback([request, &chosen] { chosen = [request] { return run_submit(*request); }; });
+  slurm->callback([request, &chosen, slurm] {
+    for (const CLI::Option* option : slurm->get_options()) {
+      if (!option->get_name().starts_with("--max-") || option->count() == 0) continue;
+      request->given_limits.push_back(option->get_name());
+      request->given_limits.push_back(option->results().back());
+    }
+    chosen = [request] { return run_submit(*request); };
+  });
 }
 
 }  // namespace octrace::app

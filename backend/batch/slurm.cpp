@@ -26,6 +26,7 @@ std::string job_name(const std::string& path) {
 std::string command(const SlurmJob& job) {
   std::string line = "exec " + shell_word(job.program) + " batch " + shell_word(job.job);
   if (!job.out.empty()) line += " --out " + shell_word(job.out);
+  for (const std::string& limit : job.limits) line += " " + shell_word(limit);
   return line;
 }
 

@@ -15,7 +15,8 @@ struct SlurmJob {
   std::string program, job;  // absolute paths of octrace and of the job's file
   std::string out;           // --out, absolute; empty: none
   std::uint64_t tasks = 1;
-  std::vector<std::string> options;  // more of octrace batch: --device cuda
+  std::vector<std::string> options;  // more of octrace batch, for the array: --device cuda
+  std::vector<std::string> limits;   // --max-views N and the like, for all tasks
 };
 
 // As one word of a POSIX shell, whatever it holds.

@@ -1,5 +1,6 @@
 // Every command of the documentation is run: lines of ```sh blocks that start with "octrace ", in
-// order, in a folder of their own that keeps what earlier ones wrote.
+// order, in a folder of their own that keeps what earlier ones wrote. A ```json block that is a job
+// is job.json for the commands after it.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -13,19 +14,25 @@ namespace {
 struct Command {
   int line;
   std::string text;
+  std::string job;  // of job.json; empty: none was shown
 };
 
 std::vector<Command> commands_of(const std::string& document) {
   std::vector<Command> commands;
   std::istringstream lines(document);
-  bool shell = false;
+  bool shell = false, json = false;
+  std::string block, job;
   int number = 0;
   for (std::string line; std::getline(lines, line);) {
     ++number;
     if (line.starts_with("```")) {
+      if (json && block.starts_with("{\"version\": 1,")) job = block;
       shell = !shell && line == "```sh";
+      json = !json && line == "```json";
+      block.clear();
       continue;
     }
+    if (json) block += line + "\n";
     if (!shell) continue;
     while (line.ends_with("\\")) {
       line.pop_back();
@@ -34,7 +41,7 @@ std::vector<Command> commands_of(const std::string& document) {
       ++number;
       line += more;
     }
-    if (line.starts_with("octrace ")) commands.push_back({number, line});
+    if (line.starts_with("octrace ")) commands.push_back({number, line, job});
   }
   return commands;
 }
@@ -63,11 +70,14 @@ class Document : public ::testing::TestWithParam<std::string> {};
 TEST_P(Document, EveryCommandRuns) {
   Scratch scratch;
   // The documents' own scene: a triangle, so that "scene.gltf" in an example is a file.
-  std::filesystem::copy_file(std::string(OCTRACE_SOURCE) + "/tests/data/triangle.gltf",
-                             scratch.path("scene.gltf"));
+  for (const char* name : {"scene.gltf", "a.glb"}) {
+    std::filesystem::copy_file(std::string(OCTRACE_SOURCE) + "/tests/data/triangle.gltf",
+                               scratch.path(name));
+  }
   const std::string folder = std::filesystem::path(OCTRACE_PROGRAM).parent_path().string();
   for (const Command& command :
        commands_of(read_text(std::string(OCTRACE_SOURCE) + "/" + GetParam()))) {
+    if (!command.job.empty()) write_text(scratch.path("job.json"), command.job);
     Launch launch;
     launch.folder = scratch.folder();
     launch.program = "/bin/sh";

@@ -74,11 +74,13 @@ TEST(SubmitSlurm, DryRunPrintsScriptsAndWritesNothing) {
   write_text(scratch.path("job's.json"), kJob);
   const Outcome outcome =
       octrace(scratch, {"submit", "slurm", "job's.json", "--tasks", "3", "--dry-run",
-                        "--sbatch-args", "--partition='a b' --time=1:00:00"});
+                        "--sbatch-args", "--partition='a b' --time=1:00:00", "--max-views", "99"});
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
   EXPECT_THAT(outcome.out, HasSubstr("#SBATCH --array=1-3\n"));
   EXPECT_THAT(outcome.out, HasSubstr("#SBATCH --requeue\n"));
-  EXPECT_THAT(outcome.out, HasSubstr("job'\\''s.json' --shard \"$SLURM_ARRAY_TASK_ID/3\""));
+  EXPECT_THAT(outcome.out, HasSubstr(" --shard \"$SLURM_ARRAY_TASK_ID/3\""));
+  EXPECT_THAT(outcome.out, HasSubstr("job'\\''s.json' '--max-views' '99' --shard"));
+  EXPECT_THAT(outcome.out, HasSubstr("job'\\''s.json' '--max-views' '99' --merge"));
   EXPECT_THAT(outcome.out, HasSubstr("'--partition=a b' '--time=1:00:00'"));
   EXPECT_THAT(outcome.out, HasSubstr("'--dependency=afterany:ARRAY_JOB'"));
   EXPECT_THAT(scratch.files(), ::testing::ElementsAre("job's.json"));
