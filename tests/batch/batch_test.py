@@ -641,6 +641,22 @@ class Disks(BatchCase):
         self.run_batch()
         self.assertEqual(self.outputs(), expected)
 
+    def test_a_full_disk_for_packs(self):
+        self.job(size=[160, 120], output="{view}.npy", aovs=["Z"],
+                 pack={"path": "out/{pack}.tar", "views": 2})
+        self.mount("-t", "tmpfs", "-o", "size=400k", "tmpfs")
+        _, err = self.run_batch(code=5)
+        self.assertIn("No space left", err)
+        self.assertEqual(self.temporaries(), [])
+        packs = [line["path"] for line in self.journal() if line["kind"] == "pack"]
+        self.assertEqual(packs, [name for name in sorted(os.listdir(self.path("out")))
+                                 if name.endswith(".tar")])
+        self.assertTrue(0 < len(packs) < 3)
+        subprocess.run(["mount", "-o", "remount,size=16m", self.path("out")], check=True)
+        self.run_batch()
+        with open(self.path("out", "summary.json")) as file:
+            self.assertEqual(json.load(file)["done"], 6)
+
     def test_a_read_only_folder(self):
         self.job()
         self.mount("-t", "tmpfs", "-o", "size=4m,ro", "tmpfs")
