@@ -12,6 +12,7 @@
 #include <string>
 #include <utility>
 
+#include "backend/gltf/draco_attributes.h"
 #include "backend/util/checked.h"
 
 namespace octrace::gltf {
@@ -69,7 +70,8 @@ std::optional<Error> check_attributes(const draco::PointCloud& cloud, const Drac
   return std::nullopt;
 }
 
-// libdraco's own decoders, stopped where memory is about to be taken for more than is allowed.
+// libdraco's own decoders, stopped where memory or time is about to be taken for more than is
+// allowed.
 template <class Base>
 class Bounded : public Base {
  public:
@@ -93,6 +95,10 @@ class Bounded : public Base {
       }
     }
     return read && !error_ && Base::DecodeConnectivity();
+  }
+
+  bool CreateAttributesDecoder(std::int32_t group) override {
+    return Base::CreateAttributesDecoder(group) && bound_attributes(*this, group, error_);
   }
 
   bool DecodeAllAttributes() override {

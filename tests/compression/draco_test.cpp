@@ -1,6 +1,8 @@
 // KHR_draco_mesh_compression, encoded by libdraco itself.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <filesystem>
 #include <functional>
 #include <random>
@@ -59,7 +61,7 @@ TEST(Draco, SharedScenesKeepEveryBit) {
 }
 
 // The base scene's one triangle, its skin and its texture coordinates.
-Parts small(DracoMethod method = DracoMethod::sequential) {
+Parts small(DracoMethod method = DracoMethod::sequential, DracoValues values = DracoValues::exact) {
   Parts parts;
   parts.root = base_scene();
   parts.bin = base_buffer();
@@ -69,7 +71,7 @@ Parts small(DracoMethod method = DracoMethod::sequential) {
     parts.root["meshes"][0].erase("weights");
     parts.root["nodes"][3].erase("weights");
   }
-  EXPECT_EQ(draco_encode(parts, method), 1);
+  EXPECT_EQ(draco_encode(parts, method, values), 1);
   return parts;
 }
 
@@ -247,6 +249,27 @@ TEST(Draco, BombIsRefused) {
     EXPECT_NE(document.error().message.find("cannot hold"), std::string::npos)
         << document.error().message;
   }
+}
+
+// A number within the attributes' data by which libdraco takes time and memory: 2^31 - 1 of them
+// are refused wherever in the stream the number is, without being counted to.
+TEST(Draco, OrientationsAreBoundedByTheMesh) {
+  const Parts valid = small(DracoMethod::edgebreaker, DracoValues::quantised);
+  ASSERT_TRUE(gltf::load_bytes(valid.glb(), "valid.glb", {}));
+  int refused = 0;
+  Parts parts = valid;
+  for (std::size_t at = stream_begin(parts) + 11; at + 4 <= valid.bin.size(); ++at) {
+    parts.bin = valid.bin;
+    constexpr std::array<std::uint8_t, 4> kMost{0xff, 0xff, 0xff, 0x7f};
+    std::copy(kMost.begin(), kMost.end(), parts.bin.begin() + static_cast<std::ptrdiff_t>(at));
+    const auto document = gltf::load_bytes(parts.glb(), "patched.glb", {});
+    if (document) continue;
+    EXPECT_NE(document.error().exit, util::Exit::internal) << document.error().to_string();
+    const bool counted = document.error().message.find("orientations") != std::string::npos;
+    if (counted) EXPECT_EQ(document.error().code, "DRACO_DATA_INVALID");
+    refused += counted;
+  }
+  EXPECT_GT(refused, 0) << "no number of orientations was found";
 }
 
 // Primitives may share accessors, so that the limit counts what is decoded and not the accessors.

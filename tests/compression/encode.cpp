@@ -94,7 +94,7 @@ std::uint32_t add_attribute(draco::Mesh& mesh, const gltf::Document& document,
 }
 
 void encode_primitive(Parts& parts, const gltf::Document& document, std::size_t m, std::size_t p,
-                      DracoMethod method) {
+                      DracoMethod method, DracoValues values) {
   const auto& source = document.model.meshes[m].primitives[p];
   const std::size_t vertices =
       document.model.accessors[static_cast<std::size_t>(source.attributes.begin()->second)].count;
@@ -116,6 +116,11 @@ void encode_primitive(Parts& parts, const gltf::Document& document, std::size_t 
   draco::Encoder encoder;
   encoder.SetEncodingMethod(method == DracoMethod::sequential ? draco::MESH_SEQUENTIAL_ENCODING
                                                               : draco::MESH_EDGEBREAKER_ENCODING);
+  if (values == DracoValues::quantised) {
+    encoder.SetAttributeQuantization(draco::GeometryAttribute::POSITION, 11);
+    encoder.SetAttributeQuantization(draco::GeometryAttribute::TEX_COORD, 10);
+    encoder.SetSpeedOptions(0, 0);
+  }
   encoder.SetTrackEncodedProperties(true);
   draco::EncoderBuffer buffer;
   ASSERT_TRUE(encoder.EncodeMeshToBuffer(mesh, &buffer).ok());
@@ -273,7 +278,7 @@ int meshopt_encode(Parts& parts, const MeshoptOptions& options) {
   return compressed;
 }
 
-int draco_encode(Parts& parts, DracoMethod method) {
+int draco_encode(Parts& parts, DracoMethod method, DracoValues values) {
   const gltf::Document document = document_of(parts);
   int compressed = 0;
   for (std::size_t m = 0; m < document.model.meshes.size(); ++m) {
@@ -281,7 +286,7 @@ int draco_encode(Parts& parts, DracoMethod method) {
     for (std::size_t p = 0; p < primitives.size(); ++p) {
       const bool morphed = !primitives[p].targets.empty() && method == DracoMethod::edgebreaker;
       if (primitives[p].mode != TINYGLTF_MODE_TRIANGLES || morphed) continue;
-      encode_primitive(parts, document, m, p, method);
+      encode_primitive(parts, document, m, p, method, values);
       ++compressed;
     }
   }

@@ -35,9 +35,11 @@ struct MeshoptOptions {
 int meshopt_encode(Parts& parts, const MeshoptOptions& options);
 
 enum class DracoMethod { sequential, edgebreaker };
-// Without quantisation. Primitives of other modes than TRIANGLES and, under edgebreaker, which
-// reorders vertices, morphed ones stay as they are. Returns how many primitives were compressed.
-int draco_encode(Parts& parts, DracoMethod method);
+enum class DracoValues { exact, quantised };
+// Primitives of other modes than TRIANGLES and, under edgebreaker, which reorders vertices, morphed
+// ones stay as they are. Quantised positions and texture coordinates are also predicted as far as
+// libdraco can. Returns how many primitives were compressed.
+int draco_encode(Parts& parts, DracoMethod method, DracoValues values = DracoValues::exact);
 
 void use_extension(nlohmann::json& root, const std::string& name, bool required = true);
 
