@@ -123,8 +123,10 @@ util::Result<SceneChanges> Animator::move_to(Time time, Scene& scene) {
   const InstanceMoves moves = moved_instances(to);
   if (was_broken || moves.any) {
     scene.bounds = bounds_of(scene.positions);
+    const std::size_t warnings = scene.warnings.size();
     auto placed_instances = place_instances(document_, plan_.instances, to.pose, to.worlds,
                                             !was_broken && !moves.meshes, scene);
+    scene.warnings.resize(warnings);  // those of the first moment are enough
     if (!placed_instances) return placed_instances.error();
   } else if (changes->positions) {
     add_instance_bounds(scene);
@@ -159,7 +161,9 @@ util::Result<Moment> Animator::at(Time time, const Scene& scene) const {
       return ok.error();
     }
     // One that is left out at one of the two moments leaves no pairs.
-    if (placed.instancing->instances.size() == scene.instancing->instances.size()) {
+    const auto &here = scene.instancing->instances, &there = placed.instancing->instances;
+    if (std::equal(here.begin(), here.end(), there.begin(), there.end(),
+                   [](const auto& a, const auto& b) { return a.object == b.object; })) {
       moment.instancing = placed.instancing;
     }
   }

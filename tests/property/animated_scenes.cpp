@@ -280,6 +280,43 @@ GltfFile skin_morph_and_camera() {
   return file;
 }
 
+// A node of instances under a parent, both moving, at times mirrored; instances of a mesh that
+// morphs, and swells beyond the power of two that its own space is measured in.
+GltfFile instances() {
+  GltfFile file;
+  const Shape shape = make_tube(0.3f, 0.9f, 9, 3);
+  const int tube = add_shape(file, shape);
+  const int soft = add_shape(file, shape, {{"targets", morph_targets(file, shape)}});
+  const auto shown = [&](int mesh, const std::vector<float>& places,
+                         const std::vector<float>& turns, const std::vector<float>& sizes) {
+    json node = {{"mesh", mesh}};
+    node["extensions"]["EXT_mesh_gpu_instancing"]["attributes"] = {
+        {"TRANSLATION", file.floats("VEC3", places)},
+        {"ROTATION", file.floats("VEC4", turns)},
+        {"SCALE", file.floats("VEC3", sizes)}};
+    return node;
+  };
+  file.root["extensionsUsed"] = {"EXT_mesh_gpu_instancing"};
+  file.append("nodes", {{"children", {1, 2}}, {"scale", {1, 1.2, 1}}});
+  file.append("nodes",
+              shown(tube, {0, 0, 0, 1, 0.5f, 0, -1, 0, 0.5f},
+                    joined({turn(0, 0, 1, 0.3f), turn(1, 0, 0, 2.0f), turn(0, 1, 1, -1.0f)}),
+                    {1, 1, 1, 0.5f, -1, 1, 1, 0.4f, 0.7f}));
+  file.append("nodes", shown(soft, {0, 0.5f, 1, 1.5f, -0.5f, -0.5f},
+                             joined({turn(1, 1, 0, 1.0f), turn(0, 1, 0, -2.0f)}),
+                             {1, 1, 1, -0.8f, 1.1f, 0.6f}));
+  file.append("nodes", {{"mesh", tube}, {"translation", {0, -1, 0}}});
+  file.append("scenes", {{"nodes", {0, 3}}});
+  AnimationMaker make(file);
+  make.add(0, "rotation", {0.0f, 0.8f, 1.6f},
+           joined({turn(0, 0, 1, 0.0f), turn(1, 1, 0, 1.3f), turn(0, 1, 0, -2.0f)}));
+  make.add(1, "translation", {0.2f, 1.0f}, {0, 0, 0, 0.5f, 0.5f, -0.5f});
+  make.add(1, "scale", {0.0f, 0.6f, 1.2f}, {1, 1, 1, -1, 1, 1.5f, 1, 2, 1}, "STEP");
+  make.add(2, "weights", {0.0f, 0.7f, 1.4f}, {0, 0, 1, 0.5f, 3, -1});
+  make.finish();
+  return file;
+}
+
 }  // namespace
 
 std::vector<AnimatedScene> animated_scenes() {
@@ -287,7 +324,8 @@ std::vector<AnimatedScene> animated_scenes() {
           {"rotations", rotations()},
           {"skin_of_two_sets", skin_of_two_sets()},
           {"morphs", morphs()},
-          {"skin_morph_and_camera", skin_morph_and_camera()}};
+          {"skin_morph_and_camera", skin_morph_and_camera()},
+          {"instances", instances()}};
 }
 
 }  // namespace octrace::tests

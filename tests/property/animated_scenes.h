@@ -14,7 +14,7 @@ struct AnimatedScene {
 };
 
 // Paths and interpolations on a hierarchy; rotations; a skin of two joint sets; morph targets;
-// a skin with morph targets and a moving camera.
+// a skin with morph targets and a moving camera; instances.
 std::vector<AnimatedScene> animated_scenes();
 
 }  // namespace octrace::tests

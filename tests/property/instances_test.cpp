@@ -129,14 +129,19 @@ TEST_P(Instances, HaveTheBitsOfEveryTriangleTested) {
   const scene::Scene scene = make_instanced_scene(GetParam(), 60, seed());
   ASSERT_TRUE(scene.instancing);
   ASSERT_EQ(scene.instancing->instances.size(), 60u);
-  octree::BuildOptions median;
-  median.builder = octree::Builder::median;
-  const auto sah_tree = octree::build(scene, {}), median_tree = octree::build(scene, median);
-  ASSERT_TRUE(sah_tree && median_tree);
-  EXPECT_TRUE(octree::verify(*sah_tree, scene));
-  EXPECT_TRUE(octree::verify(*median_tree, scene));
-  const auto view = octree::instanced_view(scene, *sah_tree);
-  const auto median_view = octree::instanced_view(scene, *median_tree);
+  std::vector<octree::Octree> trees;
+  std::vector<kernels::InstancedSceneView> views;
+  for (const auto builder :
+       {octree::Builder::sah, octree::Builder::median, octree::Builder::quality}) {
+    octree::BuildOptions options;
+    options.builder = builder;
+    auto tree = octree::build(scene, options);
+    ASSERT_TRUE(tree);
+    EXPECT_TRUE(octree::verify(*tree, scene));
+    trees.push_back(std::move(*tree));
+  }
+  for (const octree::Octree& tree : trees) views.push_back(octree::instanced_view(scene, tree));
+  const kernels::InstancedSceneView& view = views.front();
   const kernels::CpuTracer tracer;
   kernels::RenderParams params;
   params.cull = 0;
@@ -146,15 +151,15 @@ TEST_P(Instances, HaveTheBitsOfEveryTriangleTested) {
     const Ray ray = source.next();
     const InstancedHit expected = brute_force(view, *scene.instancing, ray);
     hits += expected.instance != kNone;
-    for (const auto* scene_view : {&view, &median_view}) {
+    for (const auto& scene_view : views) {
       InstancedHit found;
-      ASSERT_EQ(tracer.closest(*scene_view, params, ray, &found), kernels::TraceStatus::ok);
+      ASSERT_EQ(tracer.closest(scene_view, params, ray, &found), kernels::TraceStatus::ok);
       ASSERT_TRUE(same_bits(expected, found))
           << "seed " << seed() << ", ray " << i << ": t " << expected.t << " and " << found.t
           << ", instance " << expected.instance << " and " << found.instance << ", triangle "
           << expected.triangle << " and " << found.triangle;
       float light = -1.0f;
-      ASSERT_EQ(tracer.transmittance(*scene_view, params, ray, &light), kernels::TraceStatus::ok);
+      ASSERT_EQ(tracer.transmittance(scene_view, params, ray, &light), kernels::TraceStatus::ok);
       ASSERT_EQ(light, expected.valid() ? 0.0f : 1.0f) << "seed " << seed() << ", ray " << i;
     }
   }
@@ -191,7 +196,7 @@ TEST_P(Instances, LookLikeCopies) {
                             std::abs(found.t - expected.t) <= 1e-5f * std::max(scale, expected.t)));
     differing += !same;
   }
-  EXPECT_GT(hits, GetParam().centre == 0.0f ? rays / 8 : 0u);
+  EXPECT_GT(hits, rays / 8);
   EXPECT_LE(differing, rays / 200) << "seed " << seed();
 }
 
@@ -284,6 +289,40 @@ TEST(InstancesInTime, AreThoseOfASceneMadeAtThatTime) {
   EXPECT_EQ(bits(*next->instancing), bits(*anew.instancing));
   EXPECT_EQ(moving.bounds.lower, anew.bounds.lower);
   EXPECT_EQ(moving.bounds.upper, anew.bounds.upper);
+}
+
+// Two nodes of one instance each, of which the one is flat where the other is not.
+TEST(InstancesInTime, OnesThatVanishMakeNoPairsAndWarnOnce) {
+  GltfFile file;
+  const int mesh = file.mesh(bumpy_ball(0.0f, false));
+  const int places = file.floats("VEC3", {0, 0, 0});
+  const int times = file.floats("SCALAR", {0, 1});
+  json channels = json::array(), samplers = json::array();
+  for (int i = 0; i < 2; ++i) {
+    json node = {{"mesh", mesh}, {"translation", {3 * i, 0, 0}}};
+    node["extensions"]["EXT_mesh_gpu_instancing"]["attributes"] = {{"TRANSLATION", places}};
+    file.append("nodes", node);
+    const float first = i == 0 ? 1.0f : 0.0f, last = 1.0f - first;
+    const int scales = file.floats("VEC3", {first, 1, 1, last, 1, 1});
+    samplers.push_back({{"input", times}, {"output", scales}, {"interpolation", "STEP"}});
+    channels.push_back({{"sampler", i}, {"target", {{"node", i}, {"path", "scale"}}}});
+  }
+  file.append("scenes", {{"nodes", json::array({0, 1})}});
+  file.append("animations", {{"samplers", samplers}, {"channels", channels}});
+  scene::Scene scene;
+  auto animator = scene::Animator::open(file.document(), {}, "", 0.0, scene);
+  ASSERT_TRUE(animator) << animator.error().to_string();
+  ASSERT_EQ(scene.instancing->instances.size(), 1u);
+  EXPECT_EQ(scene.instancing->instances[0].object, 2u);
+  EXPECT_EQ(scene.warnings.size(), 1u);
+  const auto next = (*animator)->at(1.0, scene);
+  ASSERT_TRUE(next);
+  EXPECT_FALSE(next->instancing) << "an instance would move to where another one is";
+  for (const double time : {1.0, 0.5, 1.5, 0.0}) {
+    ASSERT_TRUE((*animator)->move_to(time, scene));
+    EXPECT_EQ(scene.instancing->instances.size(), 1u);
+    EXPECT_EQ(scene.warnings.size(), 1u);
+  }
 }
 
 // What a million instances may cost: a tenth of that here, counted instead of measured.

@@ -61,6 +61,8 @@ Real3 normalised(const Real3& a) {
   return length > 0.0 ? (1.0 / length) * a : a;
 }
 
+constexpr const char* kInstancing = "EXT_mesh_gpu_instancing";
+
 const Matrix kIdentity{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
 
 Matrix times(const Matrix& a, const Matrix& b) {
@@ -321,79 +323,116 @@ GltfReference::Frame GltfReference::frame(int animation, std::optional<double> s
   };
   for (const json& root : json_["scenes"][json_.value("scene", 0u)]["nodes"]) show(root);
 
+  auto next_instance = static_cast<std::uint32_t>(nodes.size());
   for (std::size_t n = 0; n < nodes.size(); ++n) {
     const json& node = nodes[n];
     if (!shown[n] || !node.contains("mesh")) continue;
-    for (const json& primitive : json_["meshes"][node["mesh"].get<std::size_t>()]["primitives"]) {
-      const json& attributes = primitive["attributes"];
-      std::vector<double> p = accessor(attributes["POSITION"]), normals;
-      if (attributes.contains("NORMAL")) normals = accessor(attributes["NORMAL"]);
-      const json targets = primitive.value("targets", json::array());
-      for (std::size_t k = 0; k < targets.size(); ++k) {
-        const auto add = [&](const char* name, std::vector<double>& to) {
-          if (!targets[k].contains(name) || to.empty()) return;
-          const auto delta = accessor(targets[k][name]);
-          for (std::size_t i = 0; i < to.size(); ++i) to[i] += states[n].weights[k] * delta[i];
-        };
-        add("POSITION", p);
-        add("NORMAL", normals);
+    if (node.contains("extensions") && node["extensions"].contains(kInstancing)) {
+      for (const Matrix& instance : instances(node["extensions"][kInstancing]["attributes"])) {
+        frame.instances.push_back(times(frame.worlds[n], instance));
+        append_mesh(node, frame.instances.back(), states[n].weights, frame, next_instance++);
       }
-      const std::size_t vertices = p.size() / 3;
-      std::vector<Matrix> matrices(vertices, frame.worlds[n]);
-      const bool skinned = node.contains("skin") && attributes.contains("JOINTS_0");
-      if (skinned) {
-        const json& skin = json_["skins"][node["skin"].get<std::size_t>()];
-        std::vector<double> binds;
-        if (skin.contains("inverseBindMatrices")) binds = accessor(skin["inverseBindMatrices"]);
-        matrices.assign(vertices, Matrix{});
-        std::vector<double> total(vertices, 0.0);
-        for (int set = 0; attributes.contains("JOINTS_" + std::to_string(set)); ++set) {
-          const auto joints = accessor(attributes["JOINTS_" + std::to_string(set)]);
-          const auto weights = accessor(attributes["WEIGHTS_" + std::to_string(set)]);
-          for (std::size_t i = 0; i < 4 * vertices; ++i) {
-            const auto joint = static_cast<std::size_t>(joints[i]);
-            Matrix bind = kIdentity;
-            if (!binds.empty())
-              std::copy_n(binds.begin() + std::ptrdiff_t(16 * joint), 16, bind.begin());
-            const Matrix m = times(frame.worlds[skin["joints"][joint].get<std::size_t>()], bind);
-            for (std::size_t e = 0; e < 16; ++e) matrices[i / 4][e] += weights[i] * m[e];
-            total[i / 4] += weights[i];
-          }
-        }
-        for (std::size_t v = 0; v < vertices; ++v) {
-          for (double& e : matrices[v]) e /= total[v];
-        }
-      }
-      std::vector<std::size_t> corners;
-      if (primitive.contains("indices")) {
-        for (const double i : accessor(primitive["indices"])) {
-          corners.push_back(static_cast<std::size_t>(i));
-        }
-      } else {
-        for (std::size_t i = 0; i < vertices; ++i) corners.push_back(i);
-      }
-      const bool two_sided =
-          primitive.contains("material") &&
-          json_["materials"][primitive["material"].get<std::size_t>()].value("doubleSided", false);
-      for (std::size_t i = 0; i + 2 < corners.size(); i += 3) {
-        ReferenceTriangle triangle{{}, {}, two_sided, static_cast<std::uint32_t>(n)};
-        for (int c = 0; c < 3; ++c) {
-          const std::size_t v = corners[i + static_cast<std::size_t>(c)];
-          triangle.corners[c] = transformed(matrices[v], {p[3 * v], p[3 * v + 1], p[3 * v + 2]}, 1);
-          if (!normals.empty()) {
-            triangle.normals[c] = transformed_normal(
-                matrices[v], {normals[3 * v], normals[3 * v + 1], normals[3 * v + 2]});
-          }
-        }
-        if (!skinned && determinant(frame.worlds[n]) < 0) {
-          std::swap(triangle.corners[1], triangle.corners[2]);
-          std::swap(triangle.normals[1], triangle.normals[2]);
-        }
-        frame.triangles.push_back(triangle);
-      }
+      continue;
     }
+    append_mesh(node, frame.worlds[n], states[n].weights, frame, static_cast<std::uint32_t>(n));
   }
   return frame;
+}
+
+std::vector<Matrix> GltfReference::instances(const json& attributes) const {
+  std::vector<Matrix> matrices;
+  const auto values = [&](const char* name) {
+    return attributes.contains(name) ? accessor(attributes[name]) : std::vector<double>();
+  };
+  const auto t = values("TRANSLATION"), r = values("ROTATION"), s = values("SCALE");
+  const std::size_t count = std::max({t.size() / 3, r.size() / 4, s.size() / 3});
+  for (std::size_t i = 0; i < count; ++i) {
+    std::array<double, 4> q{0, 0, 0, 1};
+    if (!r.empty()) {
+      double norm = 0;
+      for (std::size_t k = 4 * i; k < 4 * i + 4; ++k) norm += r[k] * r[k];
+      for (std::size_t k = 0; k < 4; ++k) q[k] = r[4 * i + k] / std::sqrt(norm);
+    }
+    const auto vector = [&](const std::vector<double>& from, double otherwise) {
+      if (from.empty()) return Real3{otherwise, otherwise, otherwise};
+      return Real3{from[3 * i], from[3 * i + 1], from[3 * i + 2]};
+    };
+    matrices.push_back(trs(vector(t, 0.0), q, vector(s, 1.0)));
+  }
+  return matrices;
+}
+
+void GltfReference::append_mesh(const json& node, const Matrix& world,
+                                const std::vector<double>& morph, Frame& frame,
+                                std::uint32_t object) const {
+  for (const json& primitive : json_["meshes"][node["mesh"].get<std::size_t>()]["primitives"]) {
+    const json& attributes = primitive["attributes"];
+    std::vector<double> p = accessor(attributes["POSITION"]), normals;
+    if (attributes.contains("NORMAL")) normals = accessor(attributes["NORMAL"]);
+    const json targets = primitive.value("targets", json::array());
+    for (std::size_t k = 0; k < targets.size(); ++k) {
+      const auto add = [&](const char* name, std::vector<double>& to) {
+        if (!targets[k].contains(name) || to.empty()) return;
+        const auto delta = accessor(targets[k][name]);
+        for (std::size_t i = 0; i < to.size(); ++i) to[i] += morph[k] * delta[i];
+      };
+      add("POSITION", p);
+      add("NORMAL", normals);
+    }
+    const std::size_t vertices = p.size() / 3;
+    std::vector<Matrix> matrices(vertices, world);
+    const bool skinned = node.contains("skin") && attributes.contains("JOINTS_0");
+    if (skinned) {
+      const json& skin = json_["skins"][node["skin"].get<std::size_t>()];
+      std::vector<double> binds;
+      if (skin.contains("inverseBindMatrices")) binds = accessor(skin["inverseBindMatrices"]);
+      matrices.assign(vertices, Matrix{});
+      std::vector<double> total(vertices, 0.0);
+      for (int set = 0; attributes.contains("JOINTS_" + std::to_string(set)); ++set) {
+        const auto joints = accessor(attributes["JOINTS_" + std::to_string(set)]);
+        const auto weights = accessor(attributes["WEIGHTS_" + std::to_string(set)]);
+        for (std::size_t i = 0; i < 4 * vertices; ++i) {
+          const auto joint = static_cast<std::size_t>(joints[i]);
+          Matrix bind = kIdentity;
+          if (!binds.empty())
+            std::copy_n(binds.begin() + std::ptrdiff_t(16 * joint), 16, bind.begin());
+          const Matrix m = times(frame.worlds[skin["joints"][joint].get<std::size_t>()], bind);
+          for (std::size_t e = 0; e < 16; ++e) matrices[i / 4][e] += weights[i] * m[e];
+          total[i / 4] += weights[i];
+        }
+      }
+      for (std::size_t v = 0; v < vertices; ++v) {
+        for (double& e : matrices[v]) e /= total[v];
+      }
+    }
+    std::vector<std::size_t> corners;
+    if (primitive.contains("indices")) {
+      for (const double i : accessor(primitive["indices"])) {
+        corners.push_back(static_cast<std::size_t>(i));
+      }
+    } else {
+      for (std::size_t i = 0; i < vertices; ++i) corners.push_back(i);
+    }
+    const bool two_sided =
+        primitive.contains("material") &&
+        json_["materials"][primitive["material"].get<std::size_t>()].value("doubleSided", false);
+    for (std::size_t i = 0; i + 2 < corners.size(); i += 3) {
+      ReferenceTriangle triangle{{}, {}, two_sided, object};
+      for (int c = 0; c < 3; ++c) {
+        const std::size_t v = corners[i + static_cast<std::size_t>(c)];
+        triangle.corners[c] = transformed(matrices[v], {p[3 * v], p[3 * v + 1], p[3 * v + 2]}, 1);
+        if (!normals.empty()) {
+          triangle.normals[c] = transformed_normal(
+              matrices[v], {normals[3 * v], normals[3 * v + 1], normals[3 * v + 2]});
+        }
+      }
+      if (!skinned && determinant(world) < 0) {
+        std::swap(triangle.corners[1], triangle.corners[2]);
+        std::swap(triangle.normals[1], triangle.normals[2]);
+      }
+      frame.triangles.push_back(triangle);
+    }
+  }
 }
 
 ReferenceRay reference_ray(const Matrix& camera, double yfov, int width, int height, double x,

@@ -1,6 +1,6 @@
-// A second reading of animated glTF, written from the specification alone and sharing nothing with
-// the product: its own JSON walk, accessors, samplers, matrices, skins, morph targets and rays, all
-// in double precision. Slow and small; trusts its input.
+// A second reading of animated and instanced glTF, written from the specification alone and sharing
+// nothing with the product: its own JSON walk, accessors, samplers, matrices, skins, morph targets
+// and rays, all in double precision. Slow and small; trusts its input.
 #pragma once
 
 #include <array>
@@ -19,7 +19,7 @@ struct ReferenceTriangle {
   std::array<Real3, 3> corners;
   std::array<Real3, 3> normals;  // world, unit; zero where the mesh has none
   bool double_sided;
-  std::uint32_t node;
+  std::uint32_t node;  // object: instances count on from the nodes, in their nodes' order
 };
 
 struct ReferenceRay {
@@ -45,7 +45,8 @@ class GltfReference {
   // The scene's triangles at a time of an animation (nothing: at rest).
   struct Frame {
     std::vector<ReferenceTriangle> triangles;
-    std::vector<Matrix> worlds;  // by node
+    std::vector<Matrix> worlds;     // by node
+    std::vector<Matrix> instances;  // of EXT_mesh_gpu_instancing, to the world
   };
   Frame frame(int animation, std::optional<double> seconds) const;
 
@@ -53,6 +54,9 @@ class GltfReference {
   std::vector<double> accessor(int index) const;
   std::vector<double> raw(const nlohmann::json& where, int component, int components,
                           bool normalised, std::size_t count) const;
+  std::vector<Matrix> instances(const nlohmann::json& attributes) const;
+  void append_mesh(const nlohmann::json& node, const Matrix& world,
+                   const std::vector<double>& morph, Frame& frame, std::uint32_t object) const;
   nlohmann::json json_;
   std::vector<std::string> buffers_;
 };

@@ -1,6 +1,7 @@
 #include "tests/support/instanced_scene.h"
 
 #include <cmath>
+#include <glm/gtc/quaternion.hpp>
 #include <random>
 
 namespace octrace::tests {
@@ -28,7 +29,7 @@ std::vector<float> bumpy_ball(float centre, bool flat) {
   return corners;
 }
 
-scene::Scene make_instanced_scene(const InstanceShape& shape, int count, std::uint64_t seed) {
+GltfFile make_instanced_file(const InstanceShape& shape, int count, std::uint64_t seed) {
   std::mt19937_64 random(seed);
   const auto uniform = [&](double low, double high) {
     return std::uniform_real_distribution<double>(low, high)(random);
@@ -39,12 +40,19 @@ scene::Scene make_instanced_scene(const InstanceShape& shape, int count, std::ui
     glm::dvec4 q(uniform(-1, 1), uniform(-1, 1), uniform(-1, 1), uniform(-1, 1));
     q = glm::normalize(q);
     for (int k = 0; k < 4; ++k) rotations.push_back(static_cast<float>(q[k]));
+    glm::dvec3 place, size;
     for (int k = 0; k < 3; ++k) {
-      translations.push_back(static_cast<float>(uniform(-spread, spread)));
+      place[k] = uniform(-spread, spread);
       double s = shape.size * uniform(shape.scale[0], shape.scale[1]);
       if (shape.mirrors && uniform(0, 1) < 0.5) s = -s;
       if (shape.flat && k == 2) s = 0.0;
-      scales.push_back(static_cast<float>(s));
+      size[k] = static_cast<float>(s);
+    }
+    // Wherever the mesh lies in its own units, its instances lie about the origin.
+    place -= glm::dquat(q.w, q.x, q.y, q.z) * (size * double{shape.centre});
+    for (int k = 0; k < 3; ++k) {
+      translations.push_back(static_cast<float>(place[k]));
+      scales.push_back(static_cast<float>(size[k]));
     }
   }
   GltfFile file;
@@ -62,7 +70,11 @@ scene::Scene make_instanced_scene(const InstanceShape& shape, int count, std::ui
   const int top = file.append("nodes", parent);
   const int plain = file.append("nodes", {{"mesh", floor}});
   file.append("scenes", {{"nodes", json::array({top, plain})}});
-  return file.scene();
+  return file;
+}
+
+scene::Scene make_instanced_scene(const InstanceShape& shape, int count, std::uint64_t seed) {
+  return make_instanced_file(shape, count, seed).scene();
 }
 
 std::vector<InstanceShape> instance_shapes() {

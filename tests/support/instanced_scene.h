@@ -26,6 +26,8 @@ std::vector<float> bumpy_ball(float centre, bool flat);
 
 // `count` instances of one ball about the origin, and a floor under them that is no instance.
 // Nodes: the instances', its parent, the floor.
+scene::testing::GltfFile make_instanced_file(const InstanceShape& shape, int count,
+                                             std::uint64_t seed);
 scene::Scene make_instanced_scene(const InstanceShape& shape, int count, std::uint64_t seed);
 
 // Plain, mirrored, sheared, tiny, huge, of very different scales, far from the mesh's own origin,
