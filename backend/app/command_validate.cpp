@@ -14,6 +14,7 @@
 #include "backend/app/reference_batch.h"
 #include "backend/app/reference_limits.h"
 #include "backend/app/time_options.h"
+#include "backend/app/validation_times.h"
 #include "backend/app/validation_views.h"
 #include "backend/image/image.h"
 #include "backend/util/interrupt.h"
@@ -44,6 +45,7 @@ struct ValidateRequest {
   int timeout = 120;
   SceneRequest scene;
   TimeOptions time;
+  std::optional<int> keys;
   ViewOptions views;
   ReferenceOptions references;
 };
@@ -52,7 +54,7 @@ constexpr const char* kHelp =
     R"(Renders every scene and camera with octrace and with each program, compares masks, depths and object
 ids, and prints one line a comparison. POV-Ray gets the triangles that octrace traces, so it checks the
 tracer and the camera; Blender reads the original file with its own importer, so it checks the loader
-as well, and with --time or --frame its own evaluation of the animation, which is glTF's at keys only.
+as well, and with --time, --frame or --keys its own evaluation of the animation, which is glTF's at keys only.
 Every camera of the scene is used; a scene that has none is framed from three sides. Back faces and
 alpha MASK are treated alike on both sides; BLEND is opaque to depth.
 
@@ -151,12 +153,9 @@ void compare_view(State& run, const Batch::Entry& entry, const ReferenceView& re
   }
 }
 
-Result<void> add_scene(State& run, const std::string& source, Batch& batch) {
+Result<void> add_scene(State& run, const SceneRequest& scene_request, const std::string& name,
+                       Batch& batch) {
   const ValidateRequest& request = run.request;
-  SceneRequest scene_request = request.scene;
-  scene_request.source = source;
-  scene_request.need_textures = false;
-  set_time(request.time, scene_request);
   auto session = open_scene(scene_request);
   if (!session) return session.error();
   auto views = render_views((*session)->scene, (*session)->octree, request.views);
@@ -168,7 +167,7 @@ Result<void> add_scene(State& run, const std::string& source, Batch& batch) {
   auto added = batch.references.add(scene_request, (*session)->scene, cameras);
   if (!added) return added.error();
   for (ValidationView& view : *views) {
-    batch.entries.push_back({label(source, request.sources), std::move(view), *limits});
+    batch.entries.push_back({name, std::move(view), *limits});
   }
   return {};
 }
@@ -188,25 +187,41 @@ Result<std::unique_ptr<Batch>> new_batch(const ValidateRequest& request) {
   return std::make_unique<Batch>(Batch{std::move(*references), {}});
 }
 
-Result<void> run_scenes(State& run) {
-  std::unique_ptr<Batch> batch;
-  for (const std::string& source : run.request.sources) {
+// Every moment of one scene.
+Result<void> add_moments(State& run, const std::string& source, std::unique_ptr<Batch>& batch) {
+  SceneRequest request = run.request.scene;
+  request.source = source;
+  request.need_textures = false;
+  auto times = validation_times(request, run.request.time, run.request.keys);
+  if (!times) return times.error();
+  for (const ValidationTime& time : *times) {
     if (util::interrupt_signal() != 0) return Error{Exit::io, "", "interrupted", "", ""};
     if (!batch) {
       auto next = new_batch(run.request);
       if (!next) return next.error();
       batch = std::move(*next);
     }
-    if (auto added = add_scene(run, source, *batch); !added) {
+    request.time = time.seconds;
+    request.animation = time.animation;
+    const std::string name = label(source, run.request.sources) + time.label;
+    if (auto added = add_scene(run, request, name, *batch); !added) return added;
+    if (batch->entries.size() < kBatchViews) continue;
+    if (auto finished = finish_batch(run, *batch); !finished) return finished;
+    batch.reset();
+  }
+  return {};
+}
+
+Result<void> run_scenes(State& run) {
+  std::unique_ptr<Batch> batch;
+  for (const std::string& source : run.request.sources) {
+    if (auto added = add_moments(run, source, batch); !added) {
       if (util::interrupt_signal() != 0) return added.error();
       Comparison comparison;
       comparison.scene = label(source, run.request.sources);
       comparison.first = comparison.second = "octrace";
       record_failure(run, std::move(comparison), added.error());
     }
-    if (batch->entries.size() < kBatchViews) continue;
-    if (auto finished = finish_batch(run, *batch); !finished) return finished;
-    batch.reset();
   }
   return batch ? finish_batch(run, *batch) : Result<void>();
 }
@@ -346,6 +361,13 @@ void declare_options(CLI::App& command, ValidateRequest& request) {
       .add_option("--scene", request.scene.scene, "index of the glTF scene [the file's default]")
       ->check(CLI::NonNegativeNumber);
   add_time_options(command, request.time);
+  command
+      .add_option("--keys", request.keys,
+                  "instead of one time, N key times of each animation (or of --animation); 0: all")
+      ->check(CLI::NonNegativeNumber)
+      ->excludes("--time")
+      ->excludes("--frame")
+      ->type_name("N");
   command
       .add_option("--threads", request.scene.build.threads,
                   "threads for octrace and for all programs together; 0: all cores [0]")

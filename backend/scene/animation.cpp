@@ -2,8 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <charconv>
 #include <map>
+#include <set>
 
 #include "backend/gltf/accessor.h"
 #include "backend/scene/names.h"
@@ -122,6 +124,17 @@ void Animation::apply(double seconds, Pose& pose) const {
         break;
     }
   }
+}
+
+std::vector<double> Animation::shared_keys() const {
+  std::set<double> keys;
+  for (const Sampler& sampler : samplers_) {
+    for (const float key : sampler.keys()) {
+      const auto holds = [&](const Sampler& other) { return other.holds(double{key}); };
+      if (std::all_of(samplers_.begin(), samplers_.end(), holds)) keys.insert(double{key});
+    }
+  }
+  return {keys.begin(), keys.end()};
 }
 
 }  // namespace octrace::scene

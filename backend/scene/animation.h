@@ -29,6 +29,9 @@ class Animation {
   // its first and last key's value before and after them.
   void apply(double seconds, Pose& pose) const;
 
+  // The key times at which no channel is between two of its keys, ascending.
+  std::vector<double> shared_keys() const;
+
  private:
   enum class Path : std::uint8_t { translation, rotation, scale, weights };
   struct Channel {

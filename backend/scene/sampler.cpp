@@ -57,6 +57,10 @@ const float* Sampler::key_value(std::size_t key) const {
   return values_.data() + key * stride_ + before;
 }
 
+bool Sampler::holds(double seconds) const {
+  return interpolation_ == Interpolation::step || locate(seconds).share == 0.0;
+}
+
 void Sampler::evaluate(double seconds, std::span<double> value) const {
   const Place place = locate(seconds);
   const std::size_t count = std::min(value.size(), width_);

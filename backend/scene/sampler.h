@@ -24,6 +24,9 @@ class Sampler {
   std::size_t width() const { return width_; }
   double start() const { return keys_.front(); }
   double end() const { return keys_.back(); }
+  std::span<const float> keys() const { return keys_; }
+  // At a key, or where a key's value is held: before the first, after the last, between steps.
+  bool holds(double seconds) const;
 
   // As many numbers as `value` has room for, at most width().
   void evaluate(double seconds, std::span<double> value) const;

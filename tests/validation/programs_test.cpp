@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <stdlib.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -208,8 +209,14 @@ class RealPrograms : public Octrace {
 };
 
 TEST_F(RealPrograms, AgreeOnOurOwnScenes) {
-  // An orthographic camera of the file's own, the built-in scenes' cameras.
-  expect_agreement({"validate", "scene.gltf", "builtin:default", "builtin:paper"}, 12);
+  const auto animated = tests::animated_scenes();
+  const auto instances = std::find_if(animated.begin(), animated.end(),
+                                      [](const auto& scene) { return scene.name == "instances"; });
+  ASSERT_NE(instances, animated.end());
+  ASSERT_TRUE(util::write_file(file("instances.gltf"), instances->file.text()));
+  // An orthographic camera of the file's own, the built-in scenes' cameras, framings of instances.
+  expect_agreement({"validate", "scene.gltf", "builtin:default", "builtin:paper", "instances.gltf"},
+                   18);
 }
 
 TEST_F(RealPrograms, AgreeOnOtherPeoplesScenes) {
@@ -227,7 +234,8 @@ TEST_F(RealPrograms, AgreeOnOtherPeoplesScenes) {
   expect_agreement(std::move(arguments), 36);
 }
 
-// Blender evaluates the animations itself, with its own importer. At keys it has what glTF has.
+// Blender evaluates the animations itself, with its own importer. At keys it has what glTF has: the
+// first, the last and one between of every animation of every shared scene.
 TEST_F(RealPrograms, BlenderAgreesAtKeyTimes) {
   const fs::path shared = fs::path(OCTRACE_SHARED_SCENES) / "valid";
   if (!fs::exists(shared)) GTEST_SKIP() << shared << " is missing";
@@ -242,11 +250,13 @@ TEST_F(RealPrograms, BlenderAgreesAtKeyTimes) {
   }
   const std::vector<std::string> common{"--against", "blender", "--size", "160x120"};
   arguments.insert(arguments.end(), common.begin(), common.end());
-  arguments.insert(arguments.end(), {"--frame", "24"});  // a key of all of them
-  expect_agreement(std::move(arguments), 21);
-  for (const char* other : {"CubeAction", "1"}) {
-    std::vector<std::string> chosen{"validate", three, "--time", "1", "--animation", other};
+  arguments.insert(arguments.end(), {"--keys", "3"});
+  expect_agreement(std::move(arguments), 9 * 3 * 3);
+  for (const std::vector<std::string>& at :
+       {std::vector<std::string>{"--frame", "24"}, {"--time", "1", "--animation", "CubeAction"}}) {
+    std::vector<std::string> chosen{"validate", three};
     chosen.insert(chosen.end(), common.begin(), common.end());
+    chosen.insert(chosen.end(), at.begin(), at.end());
     expect_agreement(std::move(chosen), 3);
   }
 }
@@ -263,7 +273,7 @@ TEST_F(RealPrograms, BlenderAgreesAtTheEndsOfOurOwnAnimations) {
   for (const char* time : {"0", "100"}) {
     std::vector<std::string> at = arguments;
     at.emplace_back(time);
-    expect_agreement(std::move(at), 13);
+    expect_agreement(std::move(at), 16);
   }
 }
 
