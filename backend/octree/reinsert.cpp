@@ -36,12 +36,12 @@ class Reinserter {
         references_(nodes_[kRoot].plan),
         touched_(tree.size, false) {
     parents_[kRoot] = 0;
-    link(kRoot);
   }
 
-  void round(float share) {
+  // False: there was too little to gain.
+  bool round(const ReinsertOptions& options) {
     const std::vector<Index> candidates = largest(std::max<std::size_t>(
-        1, static_cast<std::size_t>(share * 2.0f * static_cast<float>(references_))));
+        1, static_cast<std::size_t>(options.share * 2.0f * static_cast<float>(references_))));
     std::vector<Move> moves(candidates.size());
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, candidates.size(), 16),
                       [&](const auto& range) {
@@ -51,6 +51,13 @@ class Reinserter {
                         }
                       });
     std::erase_if(moves, [](const Move& move) { return move.gain <= 0.0f; });
+    float gain = 0.0f;
+    for (const Move& move : moves) gain += move.gain;
+    if (!linked_) {  // searching needs the parents of large nodes alone
+      if (!(gain > options.least_gain * nodes_[kRoot].half_area())) return false;
+      link(kRoot);
+      linked_ = true;
+    }
     std::sort(moves.begin(), moves.end(), [](const Move& a, const Move& b) {
       return a.gain > b.gain || (a.gain == b.gain && a.from < b.from);
     });
@@ -70,6 +77,7 @@ class Reinserter {
     }
     for (const Index i : touched_list_) touched_[i] = false;
     touched_list_.clear();
+    return true;
   }
 
  private:
@@ -88,7 +96,8 @@ class Reinserter {
 
   // The nodes of the largest surfaces: as none is larger than its parent, they are found from the
   // root down. Children of the root cannot move.
-  std::vector<Index> largest(std::size_t count) const {
+  // Links what it sees.
+  std::vector<Index> largest(std::size_t count) {
     using Entry = std::pair<float, Index>;
     std::vector<Entry> heap = {{nodes_[kRoot].half_area(), kRoot}};
     std::vector<Index> found;
@@ -101,6 +110,7 @@ class Reinserter {
       const BinaryNode& node = nodes_[index];
       if (node.leaf()) continue;
       for (const Index child : {2 * node.child, 2 * node.child + 1}) {
+        parents_[child] = index;
         heap.emplace_back(nodes_[child].half_area(), child);
         std::push_heap(heap.begin(), heap.end());
       }
@@ -195,6 +205,7 @@ class Reinserter {
   BinaryNode* nodes_;
   std::unique_ptr<Index[]> parents_;
   std::uint32_t references_;
+  bool linked_ = false;        // all parents are known
   std::vector<bool> touched_;  // by moves of this round
   std::vector<Index> touched_list_;
 };
@@ -204,7 +215,8 @@ class Reinserter {
 void reinsert(BinaryTree& tree, const ReinsertOptions& options) {
   if (options.rounds == 0 || tree.nodes[kRoot].leaf()) return;
   Reinserter reinserter(tree);
-  for (int i = 0; i < options.rounds; ++i) reinserter.round(options.share);
+  for (int i = 0; i < options.rounds && reinserter.round(options); ++i) {
+  }
 }
 
 }  // namespace octrace::octree

@@ -7,6 +7,9 @@ namespace octrace::octree {
 struct ReinsertOptions {
   int rounds = 0;
   float share = 0.01f;  // of the nodes, those of the largest surfaces, that each round looks at
+  // Nothing is moved where the first round's moves would take less than this part of the root's
+  // surface off the sum.
+  float least_gain = 0.0f;
 };
 
 // Takes subtrees out and puts them where the sum of all surfaces becomes least (Meister and Bittner
