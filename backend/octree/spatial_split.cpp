@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 namespace octrace::octree {
 
@@ -102,10 +103,6 @@ float SpatialBinning::plane(int axis, int bin) const {
   return lower[axis] + extent[axis] * (static_cast<float>(bin) / static_cast<float>(bins));
 }
 
-int SpatialBinning::bin(float position, int axis) const {
-  return std::clamp(static_cast<int>((position - lower[axis]) * scale[axis]), 0, bins - 1);
-}
-
 void SpatialBins::add(const SpatialBins& other, int bins) {
   for (int axis = 0; axis < 3; ++axis) {
     for (int bin = 0; bin < bins; ++bin) {
@@ -118,25 +115,34 @@ void SpatialBins::add(const SpatialBins& other, int bins) {
   }
 }
 
+// Axis by axis within a reference: its triangle is looked up once.
 void fill(const BuildInput& input, const Reference* references, std::uint32_t count,
           const SpatialBinning& binning, SpatialBins& bins) {
-  for (int axis = 0; axis < 3; ++axis) {
-    if (!(binning.extent[axis] > 0.0f)) continue;
-    for (std::uint32_t i = 0; i < count; ++i) {
-      Reference rest = references[i];
-      const int first = binning.bin(rest.lower[axis], axis);
-      const int last = binning.bin(rest.upper(axis), axis);
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const Reference& whole = references[i];
+    std::optional<Cutter> cutter;
+    bool whole_only = false;
+    for (int axis = 0; axis < 3; ++axis) {
+      if (!(binning.extent[axis] > 0.0f)) continue;
+      const int first = binning.bin(whole.lower[axis], axis);
+      const int last = binning.bin(whole.upper(axis), axis);
       int at = first;
-      if (first != last && may_cut(input, rest)) {
-        const Cutter cutter(input, rest);
+      if (first != last && !whole_only && !cutter) {
+        whole_only = !may_cut(input, whole);
+        if (!whole_only) cutter.emplace(input, whole);
+      }
+      if (first == last || whole_only) {
+        join_box(bins.parts[axis][at], whole);
+      } else {
+        Reference rest = whole;
         for (int next = first; next < last; ++next) {
           Reference part;
-          if (!cutter.cut(rest, axis, binning.plane(axis, next + 1), &part, &rest)) continue;
+          if (!cutter->cut(rest, axis, binning.plane(axis, next + 1), &part, &rest)) continue;
           join_box(bins.parts[axis][next], part);
           at = next + 1;
         }
+        join_box(bins.parts[axis][at], rest);
       }
-      join_box(bins.parts[axis][at], rest);
       ++bins.enter[axis][first];
       ++bins.leave[axis][at];
     }

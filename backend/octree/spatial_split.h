@@ -8,6 +8,7 @@
 // 2^-18 of the longest side, which with the padding of box tests covers the rounding of t.
 #pragma once
 
+#include <algorithm>
 #include <limits>
 
 #include "backend/octree/binary_tree.h"
@@ -24,7 +25,9 @@ struct SpatialBinning {
 
   SpatialBinning(const Bounds8& bounds, int bin_count);
   float plane(int axis, int bin) const;  // the lower end of the bin
-  int bin(float position, int axis) const;
+  int bin(float position, int axis) const {
+    return std::clamp(static_cast<int>((position - lower[axis]) * scale[axis]), 0, bins - 1);
+  }
 };
 
 struct SpatialBins {
