@@ -36,6 +36,7 @@ struct Range {
 struct Chosen {
   ObjectSplit object;
   SpatialSplit spatial;
+  int misses = 0;  // nodes in line, this one the last, where a spatial split was no better
 };
 
 // Where a reference goes: bit 0: to the lower side; bit 1: to the upper one.
@@ -68,7 +69,7 @@ class BinaryBuilder {
     });
     const Bounds8 bounds = bounds_of(references_[0].get(), count);
     root_area_ = bounds.half_area();
-    build({0, count, room, 1}, BinaryTree::kRoot, bounds, 0, 0);
+    build({0, count, room, 1}, BinaryTree::kRoot, bounds, 0, 0, 0);
     return std::move(tree_);
   }
 
@@ -103,7 +104,8 @@ class BinaryBuilder {
   }
 
   // `array`: which of the two holds the references.
-  void build(const Range& range, std::uint32_t root, const Bounds8& bounds, int array, int depth) {
+  void build(const Range& range, std::uint32_t root, const Bounds8& bounds, int array, int depth,
+             int misses) {
     Reference* references = references_[array].get() + range.first;
     if (range.count <= kSubtree && simple(range, bounds)) {
       splitter_.subtree({references, range.count, tree_.nodes.get(), range.pair, root,
@@ -111,14 +113,15 @@ class BinaryBuilder {
       return;
     }
     Sides sides;
-    divide(range, references, bounds, choose(range, references, bounds, depth),
-           references_[1 - array].get(), sides);
+    const Chosen chosen = choose(range, references, bounds, depth, misses);
+    divide(range, references, bounds, chosen, references_[1 - array].get(), sides);
     write_node(tree_.nodes[root], bounds, range.pair, range.count);
     const auto lower = [&] {
-      build(sides.lower, 2 * range.pair, sides.lower_bounds, 1 - array, depth + 1);
+      build(sides.lower, 2 * range.pair, sides.lower_bounds, 1 - array, depth + 1, chosen.misses);
     };
     const auto upper = [&] {
-      build(sides.upper, 2 * range.pair + 1, sides.upper_bounds, 1 - array, depth + 1);
+      build(sides.upper, 2 * range.pair + 1, sides.upper_bounds, 1 - array, depth + 1,
+            chosen.misses);
     };
     if (range.count <= kSubtree) {
       lower();
@@ -128,13 +131,14 @@ class BinaryBuilder {
     }
   }
 
-  Chosen choose(const Range& range, const Reference* references, const Bounds8& bounds,
-                int depth) const {
+  Chosen choose(const Range& range, const Reference* references, const Bounds8& bounds, int depth,
+                int misses) const {
     Chosen chosen;
+    chosen.misses = misses;
     if (depth >= options_.sah_depth || range.count < 2) return chosen;
     const Binning binning(bounds, options_.bins);
     chosen.object = splitter_.best(object_bins(references, range.count, binning), binning.bins);
-    if (simple(range, bounds)) return chosen;
+    if (misses >= options_.spatial_misses || simple(range, bounds)) return chosen;
     if (chosen.object.axis >= 0 &&
         (chosen.object.overlap <= options_.least_overlap * root_area_ ||
          chosen.object.overlap <= options_.least_own_overlap * bounds.half_area())) {
@@ -142,7 +146,8 @@ class BinaryBuilder {
     }
     const SpatialBinning space(bounds, options_.spatial_bins);
     const SpatialSplit spatial = best(spatial_bins(references, range.count, space), space);
-    if (spatial.cost < chosen.object.cost) chosen.spatial = spatial;
+    chosen.misses = spatial.cost < chosen.object.cost ? 0 : misses + 1;
+    if (chosen.misses == 0) chosen.spatial = spatial;
     return chosen;
   }
 

@@ -14,6 +14,8 @@ struct BinaryOptions {
   float duplicates = 0.0f;
   float least_overlap = 1e-3f;
   float least_own_overlap = 0.0f;  // and of the node's own
+  // Spatial splits are no longer tried below so many nodes in line that had no use for one.
+  int spatial_misses = 4;
 };
 
 // Leaves are single references. Needs at least one triangle.

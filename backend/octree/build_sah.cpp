@@ -16,7 +16,8 @@ BinaryOptions binary_options(bool quality) {
   // Only quality cuts triangles: looking for cuts takes most of a build's time.
   options.spatial_bins = quality ? 32 : 0;
   options.duplicates = quality ? 0.5f : 0.0f;
-  options.least_overlap = quality ? 1e-4f : 1e-3f;
+  options.least_overlap = quality ? 3e-3f : 1e-3f;
+  options.least_own_overlap = 0.1f;
   return options;
 }
 
@@ -24,9 +25,11 @@ ReinsertOptions reinsert_options(bool quality) {
   ReinsertOptions options;
   // Most scenes have nothing to gain (under 0.06 of the root's surface); where there is, as in
   // sponza (15), many rounds that look at little each find it.
-  options.rounds = quality ? 4 : 12;
-  options.share = quality ? 0.02f : 0.001f;
+  options.rounds = quality ? 10 : 12;
+  options.share = quality ? 0.1f : 0.001f;
   options.least_gain = quality ? 0.0f : 0.2f;
+  options.follow = quality;
+  options.last_gain = quality ? 0.02f : 0.0f;  // moves may take turns for ever
   return options;
 }
 

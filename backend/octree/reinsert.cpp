@@ -38,10 +38,24 @@ class Reinserter {
     parents_[kRoot] = 0;
   }
 
-  // False: there was too little to gain.
-  bool round(const ReinsertOptions& options) {
-    const std::vector<Index> candidates = largest(std::max<std::size_t>(
-        1, static_cast<std::size_t>(options.share * 2.0f * static_cast<float>(references_))));
+  void run(const ReinsertOptions& options) {
+    const auto count = std::max<std::size_t>(
+        1, static_cast<std::size_t>(options.share * 2.0f * static_cast<float>(references_)));
+    std::vector<Index> candidates = largest(count);
+    float first_gain = 0.0f;
+    for (int i = 0; i < options.rounds && !candidates.empty(); ++i) {
+      const float gain = round(candidates, options);
+      if (i == 0) first_gain = gain;
+      if (!(gain > options.last_gain * first_gain)) return;
+      if (!options.follow) candidates = largest(count);
+    }
+  }
+
+ private:
+  // Moves what can be moved, and leaves in `candidates` those worth another look: moves that stood
+  // in each other's way, and the nodes about those that were made. Returns by how much the sum of
+  // surfaces fell.
+  float round(std::vector<Index>& candidates, const ReinsertOptions& options) {
     std::vector<Move> moves(candidates.size());
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, candidates.size(), 16),
                       [&](const auto& range) {
@@ -54,19 +68,22 @@ class Reinserter {
     float gain = 0.0f;
     for (const Move& move : moves) gain += move.gain;
     if (!linked_) {  // searching needs the parents of large nodes alone
-      if (!(gain > options.least_gain * nodes_[kRoot].half_area())) return false;
+      if (!(gain > options.least_gain * nodes_[kRoot].half_area())) return 0.0f;
       link(kRoot);
       linked_ = true;
     }
     std::sort(moves.begin(), moves.end(), [](const Move& a, const Move& b) {
       return a.gain > b.gain || (a.gain == b.gain && a.from < b.from);
     });
+    candidates.clear();
+    float sum = 0.0f;
     for (const Move& move : moves) {
       const Index parent = parents_[move.from];
       const Index all[] = {move.from,        move.from ^ 1u, parent,
                            parents_[parent], move.to,        parents_[move.to]};
       const auto is_touched = [&](Index i) { return i > kRoot && touched_[i]; };
       if (std::any_of(std::begin(all), std::end(all), is_touched) || holds(move.from, move.to)) {
+        candidates.push_back(move.from);
         continue;
       }
       for (const Index i : all) {
@@ -74,13 +91,17 @@ class Reinserter {
         touched_list_.push_back(i);
       }
       apply(move);
+      sum += move.gain;
     }
     for (const Index i : touched_list_) touched_[i] = false;
+    candidates.insert(candidates.end(), touched_list_.begin(), touched_list_.end());
     touched_list_.clear();
-    return true;
+    std::sort(candidates.begin(), candidates.end());
+    candidates.erase(std::unique(candidates.begin(), candidates.end()), candidates.end());
+    std::erase_if(candidates, [&](Index i) { return parents_[i] <= kRoot; });
+    return sum;
   }
 
- private:
   void link(Index index) {
     const BinaryNode& node = nodes_[index];
     if (node.leaf()) return;
@@ -214,9 +235,7 @@ class Reinserter {
 
 void reinsert(BinaryTree& tree, const ReinsertOptions& options) {
   if (options.rounds == 0 || tree.nodes[kRoot].leaf()) return;
-  Reinserter reinserter(tree);
-  for (int i = 0; i < options.rounds && reinserter.round(options); ++i) {
-  }
+  Reinserter(tree).run(options);
 }
 
 }  // namespace octrace::octree

@@ -10,6 +10,9 @@ struct ReinsertOptions {
   // Nothing is moved where the first round's moves would take less than this part of the root's
   // surface off the sum.
   float least_gain = 0.0f;
+  // Later rounds look only at what the one before left undone or changed.
+  bool follow = false;
+  float last_gain = 0.0f;  // a round that gains at most this part of the first is the last
 };
 
 // Takes subtrees out and puts them where the sum of all surfaces becomes least (Meister and Bittner
