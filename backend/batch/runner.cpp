@@ -17,7 +17,6 @@
 #include "backend/batch/state.h"
 #include "backend/batch/view_record.h"
 #include "backend/batch/view_writer.h"
-#include "backend/image/image.h"
 #include "backend/render/tiles.h"
 #include "backend/util/interrupt.h"
 #include "backend/util/version.h"
@@ -55,7 +54,7 @@ class Run {
         done_(done),
         summary_(summary),
         threads_(render::effective_threads(options.threads)),
-        writer_(plan, journal, threads_, [this] { report(); }) {}
+        writer_(plan, journal, threads_, summary.standing.left(), [this] { report(); }) {}
 
   void run();
 
@@ -165,7 +164,8 @@ void Run::run() {
   summary_.standing.seconds = timer_.seconds();
   summary_.failures = outcome.failures;
   summary_.fatal = outcome.fatal;
-  summary_.write_ms = outcome.write_ms;
+  summary_.encode_ms = outcome.encode_ms;
+  summary_.flush_ms = outcome.flush_ms;
   summary_.interrupted = util::interrupt_signal() != 0;
 }
 
@@ -340,10 +340,6 @@ Result<RunSummary> run_plan(const Plan& plan, const RunOptions& options) {
   }
   if (auto flushed = journal->flush(); !flushed) return flushed.error();
   if (summary.standing.left() > 0) {
-    // Writers run side by side: a thread each is enough.
-    if (needs_image_library(plan.files(plan.view(begin)))) {
-      if (auto set = image::set_threads(1); !set) return set.error();
-    }
     Run(plan, options, *done, *journal, summary).run();
   }
   const ordered_json last = {{"kind", "end"},

@@ -59,7 +59,7 @@ struct RunSummary {
   bool interrupted = false;
   std::string device;
   // Milliseconds: of the tracing thread (load: what it waited for), and of all writers together.
-  double load_ms = 0.0, trace_ms = 0.0, wait_ms = 0.0, write_ms = 0.0;
+  double load_ms = 0.0, trace_ms = 0.0, wait_ms = 0.0, encode_ms = 0.0, flush_ms = 0.0;
 };
 
 // An error: nothing was rendered. Else what came of it, also where it ended early.

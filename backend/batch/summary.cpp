@@ -51,7 +51,8 @@ ordered_json summary_json(const Plan& plan, const RunOptions& options, const Run
   json["ms"] = {{"load", summary.load_ms},
                 {"trace", summary.trace_ms},
                 {"wait_for_writers", summary.wait_ms},
-                {"encode_and_write", summary.write_ms}};
+                {"encode", summary.encode_ms},
+                {"flush", summary.flush_ms}};
   json["device"] = summary.device;
   json["peak_rss_bytes"] = util::peak_resident_bytes();
   return json;

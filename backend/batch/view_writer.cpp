@@ -9,6 +9,8 @@
 #include "backend/batch/camera_choice.h"
 #include "backend/batch/output.h"
 #include "backend/batch/view_record.h"
+#include "backend/image/image.h"
+#include "backend/util/grouped_commit.h"
 #include "backend/util/interrupt.h"
 #include "backend/util/process.h"
 
@@ -52,12 +54,9 @@ ordered_json error_json(const util::Error& error) {
 
 }  // namespace
 
-ViewWriter::ViewWriter(const Plan& plan, Journal& journal, unsigned threads,
+ViewWriter::ViewWriter(const Plan& plan, Journal& journal, unsigned threads, std::uint64_t views,
                        std::function<void()> report)
-    : plan_(plan),
-      journal_(journal),
-      report_(std::move(report)),
-      most_framebuffers_(most_framebuffers(plan, threads)) {
+    : plan_(plan), journal_(journal), report_(std::move(report)) {
   if (plan.job().pack) {
     auto scratch = ScratchFolder::create();
     if (!scratch) {
@@ -67,7 +66,15 @@ ViewWriter::ViewWriter(const Plan& plan, Journal& journal, unsigned threads,
     scratch_.emplace(std::move(*scratch));
     packs_.emplace(plan, [this](const ordered_json& line) { return note(line); });
   }
-  const std::size_t writers = std::min<std::size_t>(threads, most_framebuffers_ - 1);
+  const std::size_t most = most_framebuffers(plan, threads);
+  const std::size_t writers = std::min<std::size_t>(threads, most - 1);
+  // All at once: were they made when first needed, a late moment of slow writing would add one, and
+  // memory would grow with the number of views.
+  const ImageSize& size = plan.job().size;
+  for (std::uint64_t i = 0; i < std::min<std::uint64_t>(most, views); ++i) {
+    free_.push_back(
+        std::make_unique<render::Framebuffer>(size.width, size.height, plan.needed_aovs()));
+  }
   for (std::size_t i = 0; i < writers; ++i) threads_.emplace_back([this] { work(); });
 }
 
@@ -75,15 +82,8 @@ ViewWriter::~ViewWriter() { finish(); }
 
 std::unique_ptr<render::Framebuffer> ViewWriter::acquire() {
   std::unique_lock lock(mutex_);
-  changed_.wait(
-      lock, [&] { return outcome_.fatal || !free_.empty() || framebuffers_ < most_framebuffers_; });
+  changed_.wait(lock, [&] { return outcome_.fatal || !free_.empty(); });
   if (outcome_.fatal) return nullptr;
-  if (free_.empty()) {
-    ++framebuffers_;
-    lock.unlock();
-    const ImageSize& size = plan_.job().size;
-    return std::make_unique<render::Framebuffer>(size.width, size.height, plan_.needed_aovs());
-  }
   auto framebuffer = std::move(free_.back());
   free_.pop_back();
   return framebuffer;
@@ -102,6 +102,7 @@ void ViewWriter::submit(TracedView view) {
 }
 
 void ViewWriter::finish() {
+  if (threads_.empty()) return;
   {
     const std::lock_guard lock(mutex_);
     closed_ = true;
@@ -109,6 +110,10 @@ void ViewWriter::finish() {
   }
   for (std::thread& thread : threads_) thread.join();
   threads_.clear();
+  {
+    const std::lock_guard lock(journal_mutex_);
+    if (auto flushed = flush(); !flushed) stop(flushed.error());
+  }
   if (!packs_) return;
   const std::lock_guard lock(mutex_);
   outcome_.done = packs_->done();
@@ -126,6 +131,11 @@ ViewWriter::Outcome ViewWriter::outcome() const {
 }
 
 void ViewWriter::work() {
+  // Writers run side by side: a thread each is enough. Here, because it waits for the image
+  // library, which loads while the first view is traced.
+  if (needs_image_library(plan_.files(plan_.view(0)))) {
+    if (auto set = image::set_threads(1); !set) stop(set.error());
+  }
   for (;;) {
     std::unique_lock lock(mutex_);
     changed_.wait(lock, [&] { return closed_ || !queue_.empty(); });
@@ -141,10 +151,14 @@ void ViewWriter::work() {
 
 void ViewWriter::write(TracedView& view) {
   const util::Timer timer;
+  double flush_ms = 0.0;
   std::vector<PackMember> members;
   auto files = [&]() -> Result<ordered_json> {
     try {
-      return write_files(view, members);
+      util::GroupedCommit group;
+      auto written = write_files(view, members);
+      flush_ms = group.milliseconds();
+      return written;
     } catch (const std::bad_alloc&) {
       return util::Error{util::Exit::limit, "", "out of memory", "", ""};
     }
@@ -179,7 +193,8 @@ void ViewWriter::write(TracedView& view) {
   {
     const std::lock_guard lock(mutex_);
     ++outcome_.done;
-    outcome_.write_ms += write_ms;
+    outcome_.encode_ms += write_ms - flush_ms;
+    outcome_.flush_ms += flush_ms;
   }
   const std::lock_guard lock(report_mutex_);
   report_();
@@ -195,7 +210,7 @@ Result<void> ViewWriter::keep(const ordered_json& line, std::vector<PackMember> 
 }
 
 Result<ordered_json> ViewWriter::write_files(const TracedView& view,
-                                             std::vector<PackMember>& members) const {
+                                             std::vector<PackMember>& members) {
   // Without the camera, which the journal keeps: the image library never frees a text that it was
   // given once (OIIO::ustring), and a text for each view is 0.7 kB a view for ever.
   Metadata metadata = view_metadata(plan_.job().scenes[view.view.scene].source, view.camera);
@@ -206,19 +221,21 @@ Result<ordered_json> ViewWriter::write_files(const TracedView& view,
   ordered_json files = ordered_json::array();
   for (Output& file : plan_.files(view.view)) {
     const std::string name = file.path;
+    const std::string folder = name.substr(0, name.rfind('/') + 1);
     if (scratch_) {
       file.path = fmt::format("{}{}-{}{}", scratch_->path(), view.view.index, members.size(),
                               std::filesystem::path(name).extension().string());
     }
-    auto written = write_output(file, *view.framebuffer, plan_.job().depth_scale,
-                                file.kind == FileKind::exr ? exr_metadata : metadata);
+    const auto write = [&] {
+      return write_output(file, *view.framebuffer, plan_.job().depth_scale,
+                          file.kind == FileKind::exr ? exr_metadata : metadata);
+    };
+    auto written = write();
     if (!written && written.error().exit == util::Exit::io &&
         !std::filesystem::exists(std::filesystem::path(file.path).parent_path())) {
       // The first file of its folder.
-      const std::string folder = file.path.substr(0, file.path.rfind('/') + 1);
       if (auto made = make_folder(folder); !made) return made.error();
-      written = write_output(file, *view.framebuffer, plan_.job().depth_scale,
-                             file.kind == FileKind::exr ? exr_metadata : metadata);
+      written = write();
     }
     if (!written) return written.error();
     if (scratch_) {
@@ -227,6 +244,10 @@ Result<ordered_json> ViewWriter::write_files(const TracedView& view,
       files.push_back({{"path", name}, {"bytes", content->size()}});
       members.push_back({name, std::move(*content)});
       continue;
+    }
+    {
+      const std::lock_guard lock(journal_mutex_);
+      unflushed_folders_.insert(folder);
     }
     std::error_code error;
     const auto bytes = std::filesystem::file_size(file.path, error);
@@ -269,6 +290,14 @@ Result<void> ViewWriter::note(const ordered_json& line) {
   const std::lock_guard lock(journal_mutex_);
   if (auto appended = journal_.append(text); !appended) return appended;
   if (since_flush_.seconds() < kFlushSeconds) return {};
+  return flush();
+}
+
+// The files' content was flushed before they were renamed, so a line whose file's name is lost by a
+// power cut is one of a missing file, which the next run notices.
+Result<void> ViewWriter::flush() {
+  for (const std::string& folder : unflushed_folders_) util::flush_folder(folder);
+  unflushed_folders_.clear();
   since_flush_ = util::Timer();
   return journal_.flush();
 }

@@ -8,6 +8,8 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <set>
+#include <string>
 #include <thread>
 #include <vector>
 
@@ -32,13 +34,15 @@ struct TracedView {
 class ViewWriter {
  public:
   // `report` is called after every view, by one thread at a time.
-  ViewWriter(const Plan& plan, Journal& journal, unsigned threads, std::function<void()> report);
+  // `views` is how many will come at most.
+  ViewWriter(const Plan& plan, Journal& journal, unsigned threads, std::uint64_t views,
+             std::function<void()> report);
   ~ViewWriter();  // finishes
   ViewWriter(const ViewWriter&) = delete;
   ViewWriter& operator=(const ViewWriter&) = delete;
 
-  // A framebuffer of the job's size, used before or new; waits while all are in use, which bounds
-  // how far tracing runs ahead. Null: the run is to stop.
+  // A framebuffer of the job's size; waits while all are in use, which bounds how far tracing runs
+  // ahead. Null: the run is to stop.
   std::unique_ptr<render::Framebuffer> acquire();
   void give_back(std::unique_ptr<render::Framebuffer> framebuffer);
   void submit(TracedView view);
@@ -53,7 +57,7 @@ class ViewWriter {
     std::uint64_t done = 0, failed = 0;
     std::vector<Failure> failures;
     std::optional<util::Error> fatal;
-    double write_ms = 0.0;
+    double encode_ms = 0.0, flush_ms = 0.0;  // of all writers together
   };
   Outcome outcome() const;  // also while running
 
@@ -62,9 +66,10 @@ class ViewWriter {
   void write(TracedView& view);
   // Of a packed job the files end up in `members`.
   util::Result<nlohmann::ordered_json> write_files(const TracedView& view,
-                                                   std::vector<PackMember>& members) const;
+                                                   std::vector<PackMember>& members);
   util::Result<void> keep(const nlohmann::ordered_json& line, std::vector<PackMember> members);
   util::Result<void> note(const nlohmann::ordered_json& line);
+  util::Result<void> flush();  // with journal_mutex_ held
   void stop(const util::Error& error);
 
   const Plan& plan_;
@@ -72,17 +77,16 @@ class ViewWriter {
   std::optional<ScratchFolder> scratch_;  // where members of packs are encoded
   std::optional<PackWriter> packs_;
   std::function<void()> report_;
-  std::size_t most_framebuffers_;
 
   mutable std::mutex mutex_;  // of all below
   std::condition_variable changed_;
   std::deque<TracedView> queue_;
   std::vector<std::unique_ptr<render::Framebuffer>> free_;
-  std::size_t framebuffers_ = 0;
   bool closed_ = false;
   Outcome outcome_;
 
   std::mutex journal_mutex_, report_mutex_;
+  std::set<std::string> unflushed_folders_;  // journal_mutex_'s: of files that the journal tells of
   util::Timer since_flush_;
   std::vector<std::thread> threads_;
 };

@@ -12,8 +12,13 @@ namespace octrace::image {
 
 namespace {
 
-// Rows handed over at once: enough for the compressor's threads, and a bound on the copy's memory.
-constexpr std::uint32_t kRowsAtOnce = 256;
+// Rows handed over at once: enough for the compressor's threads where it has several, else few, so
+// that they are still in the cache when they are compressed. Multiples of an EXR's blocks of rows.
+std::uint32_t rows_at_once() {
+  int threads = 0;
+  OIIO::getattribute("threads", threads);
+  return threads == 1 ? 32 : 256;
+}
 
 util::Error write_error(const std::string& path, const FileProxy& file, const std::string& said) {
   if (file.error_number() != 0) {
@@ -40,11 +45,11 @@ util::Result<void> write_file(const std::string& path, const OIIO::ImageSpec& sp
   if (!output->open(path, spec)) return write_error(path, file, output->geterror());
 
   const std::size_t row_bytes = spec.scanline_bytes(true);
-  std::vector<unsigned char> rows(
-      row_bytes * std::min<std::size_t>(kRowsAtOnce, static_cast<std::size_t>(spec.height)));
   const auto height = static_cast<std::uint32_t>(spec.height);
-  for (std::uint32_t begin = 0; begin < height; begin += kRowsAtOnce) {
-    const std::uint32_t end = std::min(height, begin + kRowsAtOnce);
+  const std::uint32_t step = std::min(rows_at_once(), height);
+  std::vector<unsigned char> rows(row_bytes * step);
+  for (std::uint32_t begin = 0; begin < height; begin += step) {
+    const std::uint32_t end = std::min(height, begin + step);
     util::Result<void> filled = fill(begin, end, rows.data());
     if (!filled) return filled;
     if (!output->write_scanlines(static_cast<int>(begin), static_cast<int>(end), 0,

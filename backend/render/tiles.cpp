@@ -19,6 +19,16 @@ Tile tile_at(const TileJob& job, std::uint64_t columns, std::uint32_t side, std:
           static_cast<std::uint32_t>(std::min<std::uint64_t>(y0 + side, job.height))};
 }
 
+// One arena for all images that a thread has traced: many views leave none behind.
+tbb::task_arena& arena_of(unsigned threads) {
+  thread_local tbb::task_arena arena;
+  if (!arena.is_active() || arena.max_concurrency() != static_cast<int>(threads)) {
+    arena.terminate();
+    arena.initialize(static_cast<int>(threads));
+  }
+  return arena;
+}
+
 }  // namespace
 
 unsigned effective_threads(unsigned threads) {
@@ -57,8 +67,7 @@ TileOutcome run_tiles(const TileJob& job) {
   // Without this, an arena gets no more threads than the machine has cores.
   const tbb::global_control allow(tbb::global_control::max_allowed_parallelism,
                                   std::max<std::size_t>(threads, effective_threads(0)));
-  tbb::task_arena arena(static_cast<int>(threads));
-  arena.execute([&] {
+  arena_of(threads).execute([&] {
     tbb::parallel_for(std::uint64_t{0}, columns * rows, run_one, tbb::simple_partitioner{});
   });
   if (failed) return TileOutcome::failed;

@@ -11,7 +11,9 @@
 #include <cstring>
 #include <filesystem>
 
+#include "backend/util/grouped_commit.h"
 #include "backend/util/interrupt.h"
+#include "backend/util/process.h"
 
 namespace octrace::util {
 
@@ -79,6 +81,8 @@ AtomicFile::~AtomicFile() {
 
 Result<void> AtomicFile::commit() {
   if (interrupt_flag()) return Error{Exit::io, "", "not written: interrupted", target_, ""};
+  GroupedCommit* const group = GroupedCommit::of_this_thread();
+  const Timer timer;
   const int descriptor = ::open(temporary_.c_str(), O_RDONLY | O_CLOEXEC);
   if (descriptor < 0) return io_error(target_, "cannot be reopened", errno);
   const int flushed = ::fsync(descriptor);
@@ -90,12 +94,10 @@ Result<void> AtomicFile::commit() {
   }
   temporary_.clear();
   // The rename itself survives a power cut only when the folder is flushed too.
-  std::filesystem::path folder = std::filesystem::path(target_).parent_path();
-  if (folder.empty()) folder = ".";
-  const int folder_descriptor = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (folder_descriptor >= 0) {
-    ::fsync(folder_descriptor);
-    ::close(folder_descriptor);
+  if (group == nullptr) {
+    flush_folder(std::filesystem::path(target_).parent_path().string());
+  } else {
+    group->add(timer.milliseconds());
   }
   return {};
 }

@@ -635,11 +635,15 @@ class Disks(BatchCase):
         self.assertIn("No space left", err)
         some = self.outputs()
         self.assertTrue(0 < len(some) < len(expected))
+        self.assertLess(some.items(), expected.items())  # none of them is cut
         self.assertEqual(self.temporaries(), [])
-        self.journal()  # every line is whole
+        told = [line["view"] for line in self.journal() if line["kind"] == "view"]  # whole lines
+        self.assertTrue(0 < len(told) <= len(some))
         subprocess.run(["mount", "-o", "remount,size=16m", self.path("out")], check=True)
         self.run_batch()
         self.assertEqual(self.outputs(), expected)
+        told = [line["view"] for line in self.journal() if line["kind"] == "view"]
+        self.assertEqual(sorted(told), list(range(len(expected))))  # none twice
 
     def test_a_full_disk_for_packs(self):
         self.job(size=[160, 120], output="{view}.npy", aovs=["Z"],
@@ -664,7 +668,20 @@ class Disks(BatchCase):
         self.assertIn("Read-only", err)
         subprocess.run(["mount", "-o", "remount,rw", self.path("out")], check=True)
         self.run_batch()
-        self.assertEqual(len(self.outputs()), 6)
+        expected = self.outputs()
+        self.assertEqual(len(expected), 6)
+        # Half done, then read-only: the journal stays as it is, and the rest is made afterwards.
+        for name in sorted(expected)[::2]:
+            os.remove(self.path("out", name))
+        before = self.journal()
+        subprocess.run(["mount", "-o", "remount,ro", self.path("out")], check=True)
+        _, err = self.run_batch(code=5)
+        self.assertIn("Read-only", err)
+        self.assertEqual(self.journal(), before)
+        subprocess.run(["mount", "-o", "remount,rw", self.path("out")], check=True)
+        _, err = self.run_batch()
+        self.assertIn("3 before", err)
+        self.assertEqual(self.outputs(), expected)
 
 
 class Progress(BatchCase):

@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
-"""Measures `octrace batch`: views a second and where the time goes, memory over many views, and Blender
-beside it on the same views.
+"""Measures `octrace batch`: views a second and where the time goes, memory over many views, runs that are
+killed, and Blender beside it on the same views. Needs Python and the program, so it also measures a bundle.
 
-    tests/bench/batch_bench.py [--octrace PROGRAM] [--views 1000] [--memory 10000] [--blender] [--kill 30]
+    tests/bench/batch_bench.py [--octrace PROGRAM] [--device cuda] [--formats exr,png] [--views 1000]
+                               [--memory 10000] [--kill 30] [--blender]
 """
 import argparse
 import hashlib
@@ -16,6 +17,10 @@ import time
 
 SCENE = "builtin:terrain:224"  # 100,352 triangles
 PLANES = ["Z", "mask", "object_id"]
+FORMATS = {"exr": {"output": "out/{camera}.exr"}, "png": {"output": "out/{camera}_{aov}.png"},
+           "npz": {"output": "out/{camera}.npz"},
+           **{"exr-" + c: {"output": "out/{camera}.exr", "compression": c}
+              for c in ("zips", "rle", "piz", "none")}}
 
 BLENDER = """
 import bpy, json, mathutils, numpy, sys
@@ -49,9 +54,9 @@ for i, (matrix, yfov) in enumerate(poses):
 """
 
 
-def write_job(folder, views, output, size=(640, 480), **members):
+def write_job(arguments, folder, views, output, size=(640, 480), **members):
     job = {"version": 1, "scenes": [SCENE], "size": list(size), "aovs": PLANES, "output": output,
-           "cameras": [{"turntable": {"n": views, "elevation": 20}}], "device": "cpu", **members}
+           "cameras": [{"turntable": {"n": views, "elevation": 20}}], "device": arguments.device, **members}
     path = os.path.join(folder, "job.json")
     with open(path, "w") as file:
         json.dump(job, file)
@@ -59,9 +64,12 @@ def write_job(folder, views, output, size=(640, 480), **members):
 
 
 def run(arguments, job, *more):
-    started = time.monotonic()
+    """Seconds by the clock, and of all processors together."""
+    before, started = os.times(), time.monotonic()
     subprocess.run([arguments.octrace, "batch", job, "--force", "--quiet", *more], check=True)
-    return time.monotonic() - started
+    seconds, after = time.monotonic() - started, os.times()
+    return seconds, (after.children_user + after.children_system -
+                     before.children_user - before.children_system)
 
 
 def summary(folder):
@@ -70,23 +78,22 @@ def summary(folder):
 
 
 def throughput(arguments, folder):
-    cases = [("EXR, " + c, {"output": "out/{camera}.exr", "compression": c})
-             for c in ("zip", "zips", "rle", "piz", "none")]
-    cases += [("PNG, one a plane", {"output": "out/{camera}_{aov}.png"}),
-              ("NPZ", {"output": "out/{camera}.npz"})]
-    for name, members in cases:
+    """Shares of a view: the tracing thread's, and of all writers together, who work beside it."""
+    for name in arguments.formats.split(","):
         shutil.rmtree(os.path.join(folder, "out"), True)
-        job = write_job(folder, arguments.views, **members)
-        seconds = run(arguments, job)
+        job = write_job(arguments, folder, arguments.views, **FORMATS[name])
+        seconds, processor = run(arguments, job)
         told = summary(folder)
-        n = told["done"]
+        n, ms = told["done"], told["ms"]
         size = sum(f["bytes"] for line in open(os.path.join(folder, "out/.octrace/journal-1-of-1.ndjson"))
                    for f in json.loads(line).get("files", [])) / n
-        ms = told["ms"]
-        print("%-18s %6.1f views/s, process %.1f s; a view: trace %.1f ms, encode and write %.1f ms, "
-              "waited %.1f ms; load %.0f ms; %.0f kB" %
-              (name, told["views_per_s"], seconds, ms["trace"] / n, ms["encode_and_write"] / n,
-               ms["wait_for_writers"] / n, ms["load"], size / 1e3), flush=True)
+        print("%-8s %6.1f views/s of %d, process %.1f s on %.2f cores, %.1f ms of processor time a view; "
+              "a view: trace %.2f, waited for writers %.2f, encode %.2f, flush %.2f ms; load %.0f ms; "
+              "%.0f kB a view; peak %.0f MB; %s" %
+              (name, told["views_per_s"], n, seconds, processor / seconds,
+               processor * 1e3 / n, ms["trace"] / n, ms["wait_for_writers"] / n,
+               ms["encode"] / n, ms["flush"] / n, ms["load"], size / 1e3,
+               told["peak_rss_bytes"] / 1e6, told["device"]), flush=True)
 
 
 def resident(pid):
@@ -98,7 +105,7 @@ def resident(pid):
 
 def memory(arguments, folder):
     shutil.rmtree(os.path.join(folder, "out"), True)
-    job = write_job(folder, arguments.memory, "out/{camera}.exr", (48, 32))
+    job = write_job(arguments, folder, arguments.memory, "out/{camera}.exr", (48, 32))
     journal = os.path.join(folder, "out/.octrace/journal-1-of-1.ndjson")
     process = subprocess.Popen([arguments.octrace, "batch", job, "--quiet"])
     marks, seen, position = {}, 0, 0
@@ -110,7 +117,7 @@ def memory(arguments, folder):
                 text = file.read()
                 position += len(text)
                 seen += text.count(b'{"kind":"view"')
-        for mark in (100, 1000, arguments.memory - 20):
+        for mark in (100, arguments.memory // 10, arguments.memory // 2, arguments.memory - 20):
             if seen >= mark and mark not in marks:
                 try:
                     marks[mark] = (seen, resident(process.pid))
@@ -119,14 +126,15 @@ def memory(arguments, folder):
     print("resident: " + ", ".join("%s kB after view %d" % (rss, at) for at, rss in marks.values()))
     values = [value[1] for value in marks.values() if value[1]]
     if len(values) > 1:
-        print("last / first: %.4f" % (values[-1] / values[0]))
+        print("last / first: %.4f, most / first: %.4f" %
+              (values[-1] / values[0], max(values) / values[0]))
 
 
 def hashes(folder):
     found = {}
     for place, _, names in os.walk(folder):
         for name in names:
-            if name.endswith(".exr"):
+            if name.endswith(".exr") or name in ("cameras.json", "objects.json"):
                 with open(os.path.join(place, name), "rb") as file:
                     found[name] = hashlib.sha256(file.read()).hexdigest()
     return found
@@ -134,34 +142,38 @@ def hashes(folder):
 
 def kill(arguments, folder):
     out = os.path.join(folder, "out")
-    job = write_job(folder, 50, "out/{camera}.exr")
+    job = write_job(arguments, folder, 50, "out/{camera}.exr")
     shutil.rmtree(out, True)
-    length = run(arguments, job)
+    length, _ = run(arguments, job)
     expected = hashes(out)
     rng = random.Random(arguments.seed)
-    twice = 0
+    journal = os.path.join(out, ".octrace/journal-1-of-1.ndjson")
+    twice, done = 0, []
     for attempt in range(arguments.kill):
         shutil.rmtree(out)
         process = subprocess.Popen([arguments.octrace, "batch", job, "--quiet"])
         time.sleep(rng.uniform(0.0, length))
         process.kill()
         process.wait()
+        before = sum('"kind":"view"' in line for line in open(journal)) if os.path.exists(journal) else 0
         left = [n for _, _, names in os.walk(out) for n in names if ".octrace-" in n]
         subprocess.run([arguments.octrace, "batch", job, "--quiet"], check=True)
         again = [n for _, _, names in os.walk(out) for n in names if ".octrace-" in n]
-        with open(os.path.join(out, ".octrace/journal-1-of-1.ndjson")) as file:
+        with open(journal) as file:
             views = [json.loads(line).get("view") for line in file if '"kind":"view"' in line]
         assert hashes(out) == expected and not again, (attempt, again)
         assert sorted(views) == list(range(50)), attempt
         twice += len(left)
-    print("%d kills (seed %d): every output as without; %d temporary files found and removed, 0 left" %
-          (arguments.kill, arguments.seed, twice))
+        done.append(before)
+    print("%d kills (seed %d) after %s of 50 views: all %d outputs as without, no view twice in the journal; "
+          "%d temporary files found and removed, 0 left" %
+          (arguments.kill, arguments.seed, sorted(done), len(expected), twice))
 
 
 def blender(arguments, folder):
-    job = write_job(folder, 10, "out/{camera}.exr")
+    job = write_job(arguments, folder, 10, "out/{camera}.exr")
     shutil.rmtree(os.path.join(folder, "out"), True)
-    times = sorted(run(arguments, job) for _ in range(3))
+    times = sorted(run(arguments, job)[0] for _ in range(3))
     poses = []
     with open(os.path.join(folder, "out/.octrace/journal-1-of-1.ndjson")) as file:
         for line in map(json.loads, file):
@@ -176,10 +188,17 @@ def blender(arguments, folder):
 
     def start(views):
         started = time.monotonic()
-        subprocess.run(["blender", "-b", "--factory-startup", "-noaudio", "--python-exit-code", "3",
-                        "-P", script, "--", glb, json.dumps(views), folder + "/b"], check=True,
-                       stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-        return time.monotonic() - started
+        # Blender's Python looks for its own modules by PATH, where another Python may come first.
+        process = subprocess.run([shutil.which("blender") or "blender", "-b", "--factory-startup", "-noaudio", "--python-exit-code", "3",
+                                  "-P", script, "--", glb, json.dumps(views), folder + "/b"],
+                                 stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+                                 env={**os.environ, "PATH": "/usr/local/bin:/usr/bin:/bin"})
+        seconds = time.monotonic() - started
+        if process.returncode != 0:
+            raise SystemExit("Blender failed: " + process.stdout[-2000:])
+        for i in range(len(views)):
+            os.remove(folder + "/b%d.exr" % i)  # it was made
+        return seconds
 
     together = start(poses)
     apart = sum(start([pose]) for pose in poses[:3]) / 3 * len(poses)
@@ -192,6 +211,8 @@ def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("--octrace", default="build/release/bin/octrace")
     parser.add_argument("--views", type=int, default=1000, help="of the throughput; 0: none")
+    parser.add_argument("--formats", default="exr,png,npz", help=", ".join(FORMATS))
+    parser.add_argument("--device", default="cpu", help="cpu, cuda or cuda:N")
     parser.add_argument("--memory", type=int, default=10000, help="views; 0: none")
     parser.add_argument("--kill", type=int, default=0, help="kill -9 a 50-view job so many times")
     parser.add_argument("--seed", type=int, default=1)

@@ -4,8 +4,10 @@
 
 #include <filesystem>
 #include <fstream>
+#include <thread>
 
 #include "backend/util/atomic_file.h"
+#include "backend/util/grouped_commit.h"
 
 namespace octrace::test {
 namespace {
@@ -41,6 +43,21 @@ TEST_F(AtomicFileTest, AppearsWhenCommitted) {
   EXPECT_FALSE(fs::exists(path("a.exr")));
   ASSERT_TRUE(file->commit());
   EXPECT_EQ(text(path("a.exr")), "content");
+  EXPECT_EQ(count(), 1u);
+}
+
+TEST_F(AtomicFileTest, InAGroupToo) {
+  {
+    util::GroupedCommit group;
+    EXPECT_EQ(util::GroupedCommit::of_this_thread(), &group);
+    std::thread([] { EXPECT_EQ(util::GroupedCommit::of_this_thread(), nullptr); }).join();
+    ASSERT_TRUE(util::write_file(path("a.json"), "content"));
+    EXPECT_EQ(text(path("a.json")), "content");
+    EXPECT_GT(group.milliseconds(), 0.0);
+    util::flush_folder(path(""));
+    util::flush_folder(path("none"));  // no error
+  }
+  EXPECT_EQ(util::GroupedCommit::of_this_thread(), nullptr);
   EXPECT_EQ(count(), 1u);
 }
 

@@ -1,0 +1,30 @@
+// Files that are flushed a folder at a time instead of each by itself.
+#pragma once
+
+#include <string>
+
+namespace octrace::util {
+
+// While one lives, files that its thread commits (atomic_file.h) are flushed and renamed, and the
+// caller flushes their folder: a rename survives a power cut only when its folder is flushed too.
+// Of the thread and not a parameter, because files are committed below layers to which flushing
+// means nothing. One at a time on a thread.
+class GroupedCommit {
+ public:
+  GroupedCommit();
+  GroupedCommit(const GroupedCommit&) = delete;
+  GroupedCommit& operator=(const GroupedCommit&) = delete;
+  ~GroupedCommit();
+  static GroupedCommit* of_this_thread();  // or null
+
+  void add(double milliseconds) { milliseconds_ += milliseconds; }
+  double milliseconds() const { return milliseconds_; }  // that flushing and renaming took
+
+ private:
+  double milliseconds_ = 0.0;
+};
+
+// "": the current folder. A file system that cannot flush a folder is no error.
+void flush_folder(const std::string& folder);
+
+}  // namespace octrace::util
