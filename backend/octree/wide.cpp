@@ -10,18 +10,33 @@
 #include <limits>
 
 #include "backend/octree/box.h"
-#include "backend/util/huge_pages.h"
 
 namespace octrace::octree {
 
 namespace {
 
 using kernels::kChildren;
+using kernels::kNodeUnits;
 using kernels::kWideLanes;
 using kernels::Node;
 using kernels::WideNode;
+using kernels::WideUnit;
 
 constexpr std::uint32_t kParallelTriangles = 16384;
+
+// Units of a leaf.
+constexpr std::uint32_t leaf_units(std::uint32_t triangles) {
+  constexpr std::uint32_t kBytes = kernels::kLeafRows * sizeof(float);
+  return (triangles * kBytes + sizeof(WideUnit) - 1) / sizeof(WideUnit);
+}
+
+float below(double value) {
+  const auto rounded = static_cast<float>(value);
+  return rounded > value ? std::nextafter(rounded, -std::numeric_limits<float>::infinity())
+                         : rounded;
+}
+
+float above(double value) { return -below(-value); }
 
 // A child's box as it was quantised. Exact: eight bits above the origin, or rounded to the nearest
 // float, which is what the walk of the compressed nodes does.
@@ -31,12 +46,8 @@ Box quantised_box(const Node& node, int slot) {
     const double scale = std::ldexp(1.0, node.exponent[axis]);
     const double lower = node.origin[axis] + node.lower[axis][slot] * scale;
     const double upper = node.origin[axis] + node.upper[axis][slot] * scale;
-    constexpr float kInfinity = std::numeric_limits<float>::infinity();
-    auto below = static_cast<float>(lower), above = static_cast<float>(upper);
-    if (below > lower) below = std::nextafter(below, -kInfinity);
-    if (above < upper) above = std::nextafter(above, kInfinity);
-    box.lower[axis] = below;
-    box.upper[axis] = above;
+    box.lower[axis] = below(lower);
+    box.upper[axis] = above(upper);
   }
   box.lower[3] = box.upper[3] = 0.0f;
   return box;
@@ -44,15 +55,15 @@ Box quantised_box(const Node& node, int slot) {
 
 struct Leaf {
   Box box;
-  int slot = 0;
   std::uint32_t count = 0;
   std::array<std::uint32_t, kWideLanes> triangles{};  // places in the octree's array
 };
 
 // Per node of the octree, children before parents.
 struct Subtree {
-  std::uint32_t triangles = 0;
-  std::uint32_t wide_nodes = 0;  // below and with this node; 0: it becomes a leaf
+  std::uint64_t triangles = 0;
+  std::uint64_t units = 0;  // at most, with this node; of a leaf where triangles <= kWideLanes
+  bool leaf() const { return triangles <= kWideLanes; }
 };
 
 class Widener {
@@ -61,33 +72,36 @@ class Widener {
 
   void run() {
     if (!measure()) return;
-    const std::uint32_t nodes = std::max(subtrees_[0].wide_nodes, 1u);
-    util::resize_in_huge_pages(to_.nodes, nodes);
-    util::resize_in_huge_pages(to_.leaves,
-                               std::uint64_t{subtrees_[0].triangles} * kernels::kLeafRows +
-                                   kWideLanes * kernels::kLeafRows);
-    const Box box = write(0, 0, 1, 0, 0.0f);
+    // Behind the nodes comes the leaf of unused slots, and room for whole vectors to be read.
+    const std::uint64_t used = std::max<std::uint64_t>(subtrees_[0].units, kNodeUnits + 1);
+    if (used + kSpareUnits > kernels::kMaxWideUnits) return;
+    nothing_ = kernels::kLeafRef | static_cast<std::uint32_t>(used);
+    to_.units = util::HugeArray<WideUnit>(used + kSpareUnits);
+    std::uint32_t next = kNodeUnits;
+    const Box box = write(0, 0, next, 0.0f);
     to_.lower = {box.lower[0], box.lower[1], box.lower[2]};
     to_.upper = {box.upper[0], box.upper[1], box.upper[2]};
   }
 
  private:
-  // Counts, and makes sure that what follows cannot leave the arrays: every builder puts children
+  static constexpr std::uint32_t kSpareUnits = 2;
+
+  // Counts, and makes sure that what follows cannot leave the array: every builder puts children
   // after their parents, so a walk downwards ends.
   bool measure() {
     const std::uint64_t count = from_.nodes.size;
-    if (count == 0 || count > kernels::kMaxWideNodes) return false;
+    if (count == 0 || count > kernels::kMaxWideUnits) return false;
     subtrees_.resize(count);
     std::vector<std::uint8_t> height(count, 1);
     for (std::uint64_t i = count; i-- > 0;) {
       const Node& node = from_.nodes[i];
       Subtree& sum = subtrees_[i];
-      std::uint64_t triangles = 0, nodes = 1, child = node.first_child;
+      std::uint64_t triangles = 0, units = kNodeUnits, child = node.first_child;
       for (int slot = 0; slot < kChildren; ++slot) {
         if ((node.inner_mask >> slot) & 1) {
           if (child <= i || child >= count) return false;
           triangles += subtrees_[child].triangles;
-          nodes += subtrees_[child].wide_nodes;
+          units += subtrees_[child].units;
           height[i] = std::max<std::uint8_t>(height[i], height[child] + 1);
           ++child;
         } else if (node.meta[slot] != 0) {
@@ -96,15 +110,15 @@ class Widener {
               from_.triangles.size)
             return false;
           triangles += in_leaf;
+          units += leaf_units(in_leaf);
         }
       }
-      if (triangles == 0 || triangles > kernels::kMaxWideTriangles ||
-          height[i] > kernels::kMaxDepth)
+      if (triangles == 0 || units > kernels::kMaxWideUnits || height[i] > kernels::kMaxDepth)
         return false;
-      sum.triangles = static_cast<std::uint32_t>(triangles);
-      sum.wide_nodes = triangles <= kWideLanes ? 0 : static_cast<std::uint32_t>(nodes);
+      sum.triangles = triangles;
+      sum.units = sum.leaf() && i != 0 ? leaf_units(static_cast<std::uint32_t>(triangles)) : units;
     }
-    return subtrees_[0].triangles <= kernels::kMaxWideTriangles;
+    return true;
   }
 
   // Holds the box of every part that spatial_split.cpp cut from the triangle: those stick out of
@@ -184,7 +198,6 @@ class Widener {
       if (!merged) break;
       Leaf& a = leaves[best_a];
       Leaf& b = leaves[best_b];
-      if (b.box.half_area() > a.box.half_area()) a.slot = b.slot;
       a.box.add(b.box);
       std::copy_n(b.triangles.begin(), b.count, a.triangles.begin() + a.count);
       a.count += b.count;
@@ -193,8 +206,9 @@ class Widener {
     return count;
   }
 
-  void write_leaf(const Leaf& leaf, std::uint32_t place) {
-    float* row = to_.leaves.data() + std::uint64_t{place} * kernels::kLeafRows;
+  // Returns the leaf's reference.
+  kernels::WideRef write_leaf(const Leaf& leaf, std::uint32_t unit) {
+    float* row = to_.units[unit].words;
     for (std::uint32_t i = 0; i < leaf.count; ++i) {
       const kernels::LeafTriangle& t = from_.triangles[leaf.triangles[i]];
       const float values[kernels::kLeafRows] = {t.a.x,
@@ -208,85 +222,40 @@ class Widener {
                                                 t.c.z,
                                                 std::bit_cast<float>(t.triangle),
                                                 std::bit_cast<float>(t.flags),
-                                                std::bit_cast<float>(t.geometry)};
+                                                reach(leaf, t)};
       for (std::uint32_t r = 0; r < kernels::kLeafRows; ++r) {
         // Indices are moved as bits: a float register might quiet a NaN.
         std::memcpy(&row[r * leaf.count + i], &values[r], sizeof(float));
       }
     }
+    return kernels::kLeafRef | (leaf.count - 1) << 28 | unit;
   }
 
-  static void set_child(WideNode& node, int slot, const Box& box, kernels::WideRef ref) {
+  static float reach(const Leaf& leaf, const kernels::LeafTriangle& t) {
+    Box both = leaf.box;
+    both.add(float4(t.a));
+    both.add(float4(t.b));
+    both.add(float4(t.c));
+    double most = 0.0;
     for (int axis = 0; axis < 3; ++axis) {
-      node.planes[axis][0][slot] = box.lower[axis];
-      node.planes[axis][1][slot] = box.upper[axis];
+      most = std::max(most, double{both.upper[axis]} - double{both.lower[axis]});
+    }
+    return above(most);
+  }
+
+  // `padding`: the share of the node's extent in what the walk pads boxes by.
+  static void set_child(WideNode& node, int slot, const Box& box, double padding,
+                        kernels::WideRef ref) {
+    for (int axis = 0; axis < 3; ++axis) {
+      node.planes[axis][0][slot] = below(box.lower[axis] - padding);
+      node.planes[axis][1][slot] = above(box.upper[axis] + padding);
     }
     node.child[slot] = ref;
   }
 
-  // Writes the subtree of the octree's node `index` to wide node `to`; `below` is where the nodes
-  // under it begin, `place` where its triangles do. Returns its box.
-  Box write(std::uint32_t index, std::uint32_t to, std::uint32_t below, std::uint32_t place,
-            float least_extent) {
-    const Node& node = from_.nodes[index];
-    WideNode& wide = to_.nodes[to];
-    constexpr float kFar = 1e30f;  // beyond all coordinates; infinity less infinity is no number
-    for (int slot = 0; slot < kChildren; ++slot) {
-      for (int axis = 0; axis < 3; ++axis) {
-        wide.planes[axis][0][slot] = kFar;
-        wide.planes[axis][1][slot] = -kFar;
-      }
-      wide.child[slot] = kernels::kLeafRef;
-    }
-
-    std::array<Leaf, kChildren> leaves;
-    std::size_t leaf_count = 0;
-    struct Inner {
-      std::uint32_t index, to, below, place;
-      int slot;
-      Box box;
-    };
-    std::array<Inner, kChildren> inner;
-    std::size_t inner_count = 0;
-    std::uint32_t child = node.first_child;
-    for (int slot = 0; slot < kChildren; ++slot) {
-      if ((node.inner_mask >> slot) & 1) {
-        if (subtrees_[child].wide_nodes == 0) {
-          Leaf& leaf = leaves[leaf_count++] = Leaf{};
-          leaf.slot = slot;
-          collect_all(from_.nodes[child], leaf);
-          narrow(leaf.box, quantised_box(node, slot));
-        } else {
-          inner[inner_count++] = {child, 0, 0, 0, slot, {}};
-        }
-        ++child;
-      } else if (node.meta[slot] != 0) {
-        Leaf& leaf = leaves[leaf_count++] = Leaf{};
-        leaf.slot = slot;
-        collect(node, slot, leaf);
-      }
-    }
-    leaf_count = merge(leaves, leaf_count);
-
-    Box bounds;
-    for (std::size_t i = 0; i < leaf_count; ++i) {
-      const Leaf& leaf = leaves[i];
-      write_leaf(leaf, place);
-      set_child(wide, leaf.slot, leaf.box, kernels::kLeafRef | (leaf.count - 1) << 27 | place);
-      place += leaf.count;
-      bounds.add(leaf.box);
-    }
-    std::uint32_t next = below + static_cast<std::uint32_t>(inner_count);
-    for (std::size_t i = 0; i < inner_count; ++i) {
-      const Subtree& subtree = subtrees_[inner[i].index];
-      inner[i].to = below + static_cast<std::uint32_t>(i);
-      inner[i].below = next;
-      inner[i].place = place;
-      next += subtree.wide_nodes - 1;
-      place += subtree.triangles;
-    }
-    // The quantised frame stands for the extent here, because the exact boxes come from below.
-    float extent = least_extent;
+  // The longest side of the node's frame, because the exact boxes come from below.
+  static float frame_extent(const Node& node) {
+    float extent = 0.0f;
     for (int axis = 0; axis < 3; ++axis) {
       int most = 0;
       for (int slot = 0; slot < kChildren; ++slot) {
@@ -294,33 +263,147 @@ class Widener {
       }
       extent = std::max(extent, std::ldexp(static_cast<float>(most), node.exponent[axis]));
     }
-    wide.extent = std::ldexp(extent, -19);
-    const auto run = [&](std::size_t i) {
-      Inner& job = inner[i];
-      job.box = write(job.index, job.to, job.below, job.place, std::ldexp(extent, -10));
-      narrow(job.box, quantised_box(node, job.slot));
-      set_child(wide, job.slot, job.box, job.to);
+    return extent;
+  }
+
+  struct Inner {
+    std::uint32_t index = 0, unit = 0;
+    Box box;
+    int children = 0;  // 0: not counted yet
+  };
+
+  struct Children {
+    std::array<Leaf, kChildren> leaves;
+    std::array<Inner, kChildren> inner;
+    std::size_t leaf_count = 0, inner_count = 0;
+    std::size_t size() const { return leaf_count + inner_count; }
+  };
+
+  void gather(const Node& node, Children& to) const {
+    std::uint32_t child = node.first_child;
+    for (int slot = 0; slot < kChildren; ++slot) {
+      if ((node.inner_mask >> slot) & 1) {
+        if (subtrees_[child].leaf()) {
+          Leaf& leaf = to.leaves[to.leaf_count++] = Leaf{};
+          collect_all(from_.nodes[child], leaf);
+          narrow(leaf.box, quantised_box(node, slot));
+        } else {
+          to.inner[to.inner_count++] = {child, 0, quantised_box(node, slot), 0};
+        }
+        ++child;
+      } else if (node.meta[slot] != 0) {
+        Leaf& leaf = to.leaves[to.leaf_count++] = Leaf{};
+        collect(node, slot, leaf);
+      }
+    }
+    to.leaf_count = merge(to.leaves, to.leaf_count);
+  }
+
+  // Puts children's children in their place while there are slots for them, the largest first:
+  // merged leaves leave half of the slots empty.
+  void open(Children& children) const {
+    while (true) {
+      std::size_t best = kChildren;
+      Children below;
+      for (std::size_t i = 0; i < children.inner_count; ++i) {
+        Inner& inner = children.inner[i];
+        if (best != kChildren && inner.box.half_area() <= children.inner[best].box.half_area())
+          continue;
+        if (inner.children == 0) {
+          Children found;
+          gather(from_.nodes[inner.index], found);
+          inner.children = static_cast<int>(found.size());
+        }
+        if (children.size() - 1 + static_cast<std::size_t>(inner.children) <= kChildren) best = i;
+      }
+      if (best == kChildren) return;
+      gather(from_.nodes[children.inner[best].index], below);
+      const Box bounds = children.inner[best].box;
+      children.inner[best] = children.inner[--children.inner_count];
+      for (std::size_t i = 0; i < below.inner_count; ++i) {
+        narrow(below.inner[i].box, bounds);
+        children.inner[children.inner_count++] = below.inner[i];
+      }
+      for (std::size_t i = 0; i < below.leaf_count; ++i) {
+        narrow(below.leaves[i].box, bounds);
+        children.leaves[children.leaf_count++] = below.leaves[i];
+      }
+      children.leaf_count = merge(children.leaves, children.leaf_count);
+    }
+  }
+
+  // Writes the subtree of the octree's node `index` to unit `unit`, and what is below from `next`
+  // on, which is moved behind it. Returns its box.
+  Box write(std::uint32_t index, std::uint32_t unit, std::uint32_t& next, float least_extent) {
+    const Node& node = from_.nodes[index];
+    WideNode& wide = reinterpret_cast<WideNode&>(to_.units[unit]);
+    const float extent = std::max(least_extent, frame_extent(node));
+    const double padding = std::ldexp(double{extent}, -19);
+    Children children;
+    gather(node, children);
+    open(children);
+
+    // Where their order is left open, the last slot comes first: leaves before nodes and the larger
+    // before the smaller, so that whatever stops a ray is found soon.
+    const auto smaller = [](const auto& a, const auto& b) {
+      return a.box.half_area() < b.box.half_area();
+    };
+    std::stable_sort(children.inner.begin(), children.inner.begin() + children.inner_count,
+                     smaller);
+    std::stable_sort(children.leaves.begin(), children.leaves.begin() + children.leaf_count,
+                     smaller);
+    Box bounds;
+    auto slot = static_cast<int>(children.inner_count);
+    for (std::size_t i = 0; i < children.leaf_count; ++i, ++slot) {
+      const Leaf& leaf = children.leaves[i];
+      set_child(wide, slot, leaf.box, padding, write_leaf(leaf, next));
+      next += leaf_units(leaf.count);
+      bounds.add(leaf.box);
+    }
+    const auto run = [&](std::size_t i, std::uint32_t& place) {
+      Inner& inner = children.inner[i];
+      const Box box = write(inner.index, inner.unit, place, std::ldexp(extent, -10));
+      narrow(inner.box, box);
+      set_child(wide, static_cast<int>(i), inner.box, padding, inner.unit);
     };
     if (subtrees_[index].triangles < kParallelTriangles) {
-      for (std::size_t i = 0; i < inner_count; ++i) run(i);
+      for (std::size_t i = 0; i < children.inner_count; ++i) {
+        children.inner[i].unit = next;
+        next += kNodeUnits;
+        run(i, next);
+      }
     } else {
-      tbb::parallel_for(std::size_t{0}, inner_count, run);
+      for (std::size_t i = 0; i < children.inner_count; ++i) {
+        children.inner[i].unit = next;
+        next += static_cast<std::uint32_t>(subtrees_[children.inner[i].index].units);
+      }
+      tbb::parallel_for(std::size_t{0}, children.inner_count, [&](std::size_t i) {
+        std::uint32_t place = children.inner[i].unit + kNodeUnits;
+        run(i, place);
+      });
     }
-    for (std::size_t i = 0; i < inner_count; ++i) bounds.add(inner[i].box);
+    for (std::size_t i = 0; i < children.inner_count; ++i) bounds.add(children.inner[i].box);
+
+    constexpr float kFar = 1e30f;  // beyond all coordinates; infinity less infinity is no number
+    for (; slot < kChildren; ++slot) {
+      for (int axis = 0; axis < 3; ++axis) {
+        wide.planes[axis][0][slot] = kFar;
+        wide.planes[axis][1][slot] = -kFar;
+      }
+      wide.child[slot] = nothing_;
+    }
     return bounds;
   }
 
   const kernels::OctreeView& from_;
   WideOctree& to_;
   std::vector<Subtree> subtrees_;
+  kernels::WideRef nothing_ = kernels::kLeafRef;
 };
 
 }  // namespace
 
-kernels::WideView WideOctree::view() const {
-  if (nodes.empty()) return {};
-  return {nodes.data(), leaves.data(), lower, upper};
-}
+kernels::WideView WideOctree::view() const { return {units.data(), lower, upper}; }
 
 WideOctree make_wide(const kernels::OctreeView& octree) {
   WideOctree wide;

@@ -1,23 +1,18 @@
 // Rewrites an octree into the nodes that the CPU walks (kernels/cpu/wide_node.h).
 #pragma once
 
-#include <memory>
-#include <vector>
-
 #include "backend/octree/octree.h"
+#include "backend/util/huge_array.h"
 #include "kernels/cpu/wide_node.h"
 
 namespace octrace::octree {
 
 struct WideOctree {
-  std::vector<kernels::WideNode> nodes;
-  std::vector<float> leaves;
+  util::HugeArray<kernels::WideUnit> units;
   kernels::Vec3 lower{0.0f}, upper{0.0f};
 
   kernels::WideView view() const;
-  std::uint64_t bytes() const {
-    return nodes.size() * sizeof(kernels::WideNode) + leaves.size() * sizeof(float);
-  }
+  std::uint64_t bytes() const { return units.size() * sizeof(kernels::WideUnit); }
 };
 
 // Subtrees of up to eight triangles become leaves, and leaves of a node that lie together are

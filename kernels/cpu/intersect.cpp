@@ -117,11 +117,12 @@ HWY_ATTR HWY_INLINE void trace_one(const WideView& tree, const SceneView& scene,
   begin(tree, from, 0, ray);
   while (ray.ref != kDoneRef) {
     if ((ray.ref & kLeafRef) == 0) {
-      visit_node(tree, ray);
-    } else if (visit_leaf<Query>(tree, scene, params, ray)) {
-      return;
+      visit_node<Query::kNearest>(tree, ray);
+      continue;
     }
-    pop(ray);
+    const std::uint32_t left = candidates(tree, ray);
+    if (left != 0 && test<Query>(tree, scene, params, ray, left)) return;
+    ray.pop();
   }
 }
 #endif

@@ -16,6 +16,12 @@ namespace octrace::kernels::HWY_NAMESPACE {
 inline constexpr std::uint32_t kPacketVectors = 2;
 inline constexpr std::uint32_t kPacketRays = 8 * kPacketVectors;
 
+// Slots in the order of their visit from the last one backwards, by octant.
+alignas(32) inline constexpr std::uint32_t kFarToNear[8][8] = {
+    {7, 6, 5, 4, 3, 2, 1, 0}, {6, 7, 4, 5, 2, 3, 0, 1}, {5, 4, 7, 6, 1, 0, 3, 2},
+    {4, 5, 6, 7, 0, 1, 2, 3}, {3, 2, 1, 0, 7, 6, 5, 4}, {2, 3, 0, 1, 6, 7, 4, 5},
+    {1, 0, 3, 2, 5, 4, 7, 6}, {0, 1, 2, 3, 4, 5, 6, 7}};
+
 // A packet that needs more steps than this, of a node or half a triangle each, is not coherent
 // enough: its rays cost less in a stream.
 inline constexpr std::uint32_t kPacketSteps = 128;
@@ -256,7 +262,7 @@ HWY_ATTR HWY_INLINE bool test(const SceneView& scene, const RenderParams& params
       continue;
     }
     if (found.t == p.tmax[k] && id > p.triangle[k]) continue;
-    if (holes && !alpha_passes(scene, word(kRowGeometry), id, found.u, found.v)) continue;
+    if (holes && !alpha_passes(scene, scene.triangle_geometry[id], id, found.u, found.v)) continue;
     p.tmax[k] = p.t[k] = found.t;
     p.u[k] = found.u;
     p.v[k] = found.v;
@@ -273,7 +279,7 @@ HWY_ATTR HWY_INLINE std::uint32_t visit_leaf(const WideView& tree, const SceneVi
   const Floats d;
   using V = hn::Vec<Floats>;
   const std::uint32_t n = leaf_count(leaf);
-  const float* rows = tree.leaves + std::uint64_t{leaf_first(leaf)} * kLeafRows;
+  const float* rows = tree.leaf(leaf);
   V enter[3], leave[3];
   for (std::uint32_t axis = 0; axis < 3; ++axis) {
     const V a = hn::LoadU(d, rows + axis * n), b = hn::LoadU(d, rows + (3 + axis) * n);
@@ -326,7 +332,7 @@ HWY_ATTR HWY_INLINE bool trace_packet(const WideView& tree, const SceneView& sce
       steps += 2 * visit_leaf(tree, scene, params, ref, tmin, p);
       continue;
     }
-    const WideNode& node = tree.nodes[ref];
+    const WideNode& node = tree.node(ref);
     const auto* bytes = reinterpret_cast<const std::uint8_t*>(&node);
     hn::Vec<Floats> enter[3], leave[3], near;
     for (int axis = 0; axis < 3; ++axis) {

@@ -17,60 +17,87 @@ inline constexpr std::uint32_t kWalks = 16;
 
 // The walks that wait for a step of one kind.
 struct Queue {
-  std::uint8_t walks[kWalks];
-  std::uint32_t size;
+  WideRay* walks[kWalks] = {};
+  std::uint32_t size = 0;
+
+  // The walks that wait now. Each enters one queue again, this one not before it has been read.
+  OCTRACE_FORCE_INLINE std::uint32_t take() {
+    const std::uint32_t taken = size;
+    size = 0;
+    return taken;
+  }
 };
 
-// Queues by kind: the two highest bits of a WideRef. (Leaves have kDoneRef's bit free.)
-enum StepKind : std::uint32_t { kNodeStep = 0, kDoneStep = 1, kLeafStep = 2 };
+// The first two are the highest bits of a WideRef. (Leaves have two.)
+enum StepKind : std::uint32_t { kNodeStep, kDoneStep, kLeafStep, kTestStep, kStepKinds };
 
-HWY_ATTR HWY_INLINE void enqueue(const WideView& tree, const WideRay& ray, std::uint32_t walk,
-                                 Queue* queues) {
-  prefetch(tree, ray.ref);
-  Queue& queue = queues[ray.ref >> 30];
-  queue.walks[queue.size++] = static_cast<std::uint8_t>(walk);
+HWY_ATTR HWY_INLINE void enqueue(const WideView& tree, WideRay* walk, Queue* queues) {
+  prefetch(tree, walk->ref);
+  const std::uint32_t kind = walk->ref >> 30;
+  Queue& queue = queues[kind < kLeafStep ? kind : kLeafStep];
+  queue.walks[queue.size++] = walk;
 }
 
 // Calls store(index, ray) for each of rays[0, count) as it ends.
+//
+// A round takes every queue once, so that how long each loop runs is known before it begins: a
+// branch on what a step has just found would be guessed, often wrongly, and found out late.
 template <class Query, class Store>
-HWY_ATTR HWY_INLINE void trace_stream(const WideView& tree, const SceneView& scene,
+HWY_ATTR HWY_INLINE void trace_stream(const WideView& from, const SceneView& scene,
                                       const RenderParams& params, const Ray* rays,
                                       std::uint32_t count, const Store& store) {
+  const WideView tree = from;  // so that stores leave it in registers
   WideRay walks[kWalks];
-  Queue queues[4] = {};
+  Queue queues[kStepKinds];
+  Queue &nodes = queues[kNodeStep], &leaves = queues[kLeafStep];
+  Queue &tests = queues[kTestStep], &done = queues[kDoneStep];
   std::uint32_t next = 0;
   for (; next < count && next < kWalks; ++next) {
     begin(tree, rays[next], next, walks[next]);
-    enqueue(tree, walks[next], next, queues);
+    enqueue(tree, &walks[next], queues);
   }
-  Queue &nodes = queues[kNodeStep], &leaves = queues[kLeafStep], &done = queues[kDoneStep];
   while (nodes.size + leaves.size + done.size != 0) {
-    // A queue is read in front of where it is written: every walk read enters one queue again.
-    std::uint32_t size = nodes.size;
-    nodes.size = 0;
+    std::uint32_t size = nodes.take();
     for (std::uint32_t i = 0; i < size; ++i) {
-      const std::uint32_t walk = nodes.walks[i];
-      visit_node(tree, walks[walk]);
-      pop(walks[walk]);
-      enqueue(tree, walks[walk], walk, queues);
+      WideRay* walk = nodes.walks[i];
+      visit_node<Query::kNearest>(tree, *walk);
+      enqueue(tree, walk, queues);
     }
-    size = leaves.size;
-    leaves.size = 0;
+    size = leaves.take();
     for (std::uint32_t i = 0; i < size; ++i) {
-      const std::uint32_t walk = leaves.walks[i];
-      if (visit_leaf<Query>(tree, scene, params, walks[walk])) walks[walk].depth = 1;
-      pop(walks[walk]);
-      enqueue(tree, walks[walk], walk, queues);
+      WideRay* walk = leaves.walks[i];
+      const std::uint32_t left = candidates(tree, *walk);
+      const std::uint32_t top = walk->depth - 1;
+      const WideRef ref = walk->stack_ref[top];
+      const float t = walk->stack_t[top];
+      walk->candidates = left;
+      walk->depth = left == 0 ? top : top + 1;
+      walk->ref = left == 0 ? ref : walk->ref;
+      walk->t = left == 0 ? t : walk->t;
+      prefetch(tree, ref);
+      std::uint32_t kind = ref >> 30;
+      kind = kind < kLeafStep ? kind : kLeafStep;
+      Queue& queue = queues[left == 0 ? kind : kTestStep];
+      queue.walks[queue.size++] = walk;
     }
-    size = done.size;
-    done.size = 0;
+    size = tests.take();
     for (std::uint32_t i = 0; i < size; ++i) {
-      const std::uint32_t walk = done.walks[i];
-      store(walks[walk].index, walks[walk]);
+      WideRay* walk = tests.walks[i];
+      if (test<Query>(tree, scene, params, *walk, walk->candidates)) {
+        walk->finish();
+      } else {
+        walk->pop();
+      }
+      enqueue(tree, walk, queues);
+    }
+    size = done.take();
+    for (std::uint32_t i = 0; i < size; ++i) {
+      WideRay* walk = done.walks[i];
+      store(walk->index, *walk);
       if (next == count) continue;
-      begin(tree, rays[next], next, walks[walk]);
+      begin(tree, rays[next], next, *walk);
       ++next;
-      enqueue(tree, walks[walk], walk, queues);
+      enqueue(tree, walk, queues);
     }
   }
 }

@@ -1,0 +1,35 @@
+#include "backend/util/huge_array.h"
+
+#include <sys/mman.h>
+
+#include <cstdint>
+#include <new>
+
+namespace octrace::util {
+
+namespace {
+constexpr std::size_t kHugePage = std::size_t{2} << 20;
+}
+
+HugeMemory::HugeMemory(std::size_t bytes) {
+  if (bytes == 0) return;
+  if (bytes > SIZE_MAX / 2) throw std::bad_alloc();
+  mapped_bytes_ = bytes + kHugePage;
+  mapped_ =
+      mmap(nullptr, mapped_bytes_, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+  if (mapped_ == MAP_FAILED) {
+    mapped_ = nullptr;
+    throw std::bad_alloc();
+  }
+  const auto address = reinterpret_cast<std::uintptr_t>(mapped_);
+  const std::uintptr_t aligned = (address + kHugePage - 1) / kHugePage * kHugePage;
+  data_ = reinterpret_cast<void*>(aligned);
+  // Only whole huge pages, so that small arrays do not take 2 MiB. A refusal costs speed alone.
+  madvise(data_, bytes / kHugePage * kHugePage, MADV_HUGEPAGE);
+}
+
+HugeMemory::~HugeMemory() {
+  if (mapped_ != nullptr) munmap(mapped_, mapped_bytes_);
+}
+
+}  // namespace octrace::util
