@@ -145,19 +145,20 @@ class CpuRenderer final : public Renderer {
  public:
   CpuRenderer(const scene::Scene& scene, const octree::Octree& octree)
       : source_(scene), octree_(octree) {
-    look();
+    look(true);
   }
 
   util::Result<TraceStats> render(const kernels::RayCamera& camera, const Settings& settings,
                                   Framebuffer& framebuffer) override;
-  util::Result<void> refresh(const scene::SceneChanges&) override {
-    look();
+  util::Result<void> refresh(const scene::SceneChanges& changes) override {
+    look(changes.geometry());
     return {};
   }
 
  private:
-  void look() {
+  void look(bool moved) {
     scene_ = octree::instanced_view(source_, octree_);
+    if (!moved) return;
     // Only scenes without instances are walked by their wide nodes.
     wide_ = kernels::CpuTracer::uses_wide() && scene_.top.nodes.empty()
                 ? octree::make_wide(scene_.octree)

@@ -16,15 +16,9 @@ namespace octrace::kernels::HWY_NAMESPACE {
 inline constexpr std::uint32_t kPacketVectors = 2;
 inline constexpr std::uint32_t kPacketRays = 8 * kPacketVectors;
 
-// Slots in the order of their visit from the last one backwards, by octant.
-alignas(32) inline constexpr std::uint32_t kFarToNear[8][8] = {
-    {7, 6, 5, 4, 3, 2, 1, 0}, {6, 7, 4, 5, 2, 3, 0, 1}, {5, 4, 7, 6, 1, 0, 3, 2},
-    {4, 5, 6, 7, 0, 1, 2, 3}, {3, 2, 1, 0, 7, 6, 5, 4}, {2, 3, 0, 1, 6, 7, 4, 5},
-    {1, 0, 3, 2, 5, 4, 7, 6}, {0, 1, 2, 3, 4, 5, 6, 7}};
-
 // A packet that needs more steps than this, of a node or half a triangle each, is not coherent
 // enough: its rays cost less in a stream.
-inline constexpr std::uint32_t kPacketSteps = 128;
+inline constexpr std::uint32_t kPacketSteps = 512;
 
 struct alignas(64) Packet {
   float origin[3][kPacketRays], direction[3][kPacketRays], inverse[3][kPacketRays];
@@ -36,6 +30,9 @@ struct alignas(64) Packet {
   // the distance least, planes that are left from the one that makes it most.
   float enter_origin[3], leave_origin[3], least[3], most[3], slope[3];
   float beam_tmin, beam_tmax;
+  // For rays of one origin: what candidates() in wide_walk-inl.h keeps for one ray.
+  bool one_origin;
+  float edge, ahead;
   std::uint32_t octant, enter[3];
   alignas(32) float stack_t[kWideStack];
   alignas(32) WideRef stack_ref[kWideStack];
@@ -86,7 +83,8 @@ HWY_ATTR HWY_INLINE void prepare(Packet& p, std::uint32_t first) {
 }
 
 // False: the rays' directions have different signs, so that no order of visits suits them all.
-HWY_ATTR HWY_INLINE bool begin(const Ray* rays, std::uint32_t count, Packet& p) {
+HWY_ATTR HWY_INLINE bool begin(const WideView& tree, const Ray* rays, std::uint32_t count,
+                               Packet& p) {
   std::uint32_t all = 7, any = 0;
   for (std::uint32_t i = 0; i < kPacketRays; ++i) {
     const Ray& ray = rays[i < count ? i : count - 1];
@@ -117,9 +115,14 @@ HWY_ATTR HWY_INLINE bool begin(const Ray* rays, std::uint32_t count, Packet& p) 
     for (std::uint32_t i = 8; i < kPacketRays; i += 8) v = hn::Max(v, hn::Load(d, from + i));
     return hn::GetLane(hn::MaxOfLanes(d, v));
   };
+  p.one_origin = true;
+  float farthest = 0.0f;
   for (int axis = 0; axis < 3; ++axis) {
     const bool negative = (all >> axis) & 1;
     const float lower = least(p.origin[axis]), upper = most(p.origin[axis]);
+    p.one_origin &= lower == upper;
+    farthest = greater(farthest,
+                       greater(abs_of(tree.lower[axis] - lower), abs_of(tree.upper[axis] - lower)));
     p.enter_origin[axis] = negative ? lower : upper;
     p.leave_origin[axis] = negative ? upper : lower;
     p.least[axis] = least(p.inverse[axis]);
@@ -127,6 +130,17 @@ HWY_ATTR HWY_INLINE bool begin(const Ray* rays, std::uint32_t count, Packet& p) 
     p.slope[axis] = negative ? -p.least[axis] : p.most[axis];
     p.enter[axis] = static_cast<std::uint32_t>(axis) * 64 + (negative ? 32 : 0);
   }
+  float largest = 0.0f, smallest = std::numeric_limits<float>::infinity();
+  for (std::uint32_t first = 0; first < kPacketRays; first += 8) {
+    const auto length = hn::Max(hn::Max(hn::Abs(hn::Load(d, p.direction[0] + first)),
+                                        hn::Abs(hn::Load(d, p.direction[1] + first))),
+                                hn::Abs(hn::Load(d, p.direction[2] + first)));
+    largest = greater(largest, hn::GetLane(hn::MaxOfLanes(d, length)));
+    smallest = lesser(smallest, hn::GetLane(hn::MinOfLanes(d, length)));
+  }
+  p.one_origin &= farthest * farthest * greater(farthest, largest) < 1e30f;
+  p.edge = largest * 0x1p-16f;
+  p.ahead = 0x1p-11f / smallest;
   p.beam_tmin = least(p.tmin);
   p.beam_tmax = most(p.tmax);
   return true;
@@ -158,6 +172,72 @@ HWY_ATTR HWY_INLINE auto meet(const Packet& p, const Vectors& enter, const Vecto
   }
   *near_out = near;
   return hn::Le(near, far);
+}
+
+// candidates() of wide_walk-inl.h, for rays of one origin: what all of them share, a triangle a
+// lane.
+struct LeafVolumes {
+  alignas(32) float u[3][8], v[3][8], normal[3][8];
+  alignas(32) float distance[8], edge[8], plane[8], ahead[8];
+};
+
+HWY_ATTR HWY_INLINE void prepare(const Packet& p, const float* rows, std::uint32_t n,
+                                 LeafVolumes& to) {
+  const Floats d;
+  using V = hn::Vec<Floats>;
+  const auto row = [&](std::uint32_t r) HWY_ATTR { return hn::LoadU(d, rows + r * n); };
+  const V ax = row(0), ay = row(1), az = row(2);
+  const V bx = hn::Sub(ax, row(3)), by = hn::Sub(ay, row(4)), bz = hn::Sub(az, row(5));
+  const V cx = hn::Sub(row(6), ax), cy = hn::Sub(row(7), ay), cz = hn::Sub(row(8), az);
+  const V ox = hn::Sub(ax, hn::Set(d, p.origin[0][0]));
+  const V oy = hn::Sub(ay, hn::Set(d, p.origin[1][0]));
+  const V oz = hn::Sub(az, hn::Set(d, p.origin[2][0]));
+  const auto cross = [&](V xa, V ya, V za, V xb, V yb, V zb, float(*out)[8]) HWY_ATTR {
+    hn::Store(hn::MulSub(ya, zb, hn::Mul(za, yb)), d, out[0]);
+    hn::Store(hn::MulSub(za, xb, hn::Mul(xa, zb)), d, out[1]);
+    hn::Store(hn::MulSub(xa, yb, hn::Mul(ya, xb)), d, out[2]);
+  };
+  cross(cx, cy, cz, ox, oy, oz, to.u);
+  cross(bx, by, bz, ox, oy, oz, to.v);
+  cross(cx, cy, cz, bx, by, bz, to.normal);
+  hn::Store(
+      hn::MulAdd(hn::Load(d, to.normal[0]), ox,
+                 hn::MulAdd(hn::Load(d, to.normal[1]), oy, hn::Mul(hn::Load(d, to.normal[2]), oz))),
+      d, to.distance);
+  const V reach = row(kRowReach);
+  const V far = hn::Add(reach, hn::Max(hn::Max(hn::Abs(ox), hn::Abs(oy)), hn::Abs(oz)));
+  const V area = hn::Mul(reach, far);
+  const V tiny = hn::Set(d, 1e-37f);
+  hn::Store(hn::MulAdd(area, hn::Set(d, p.edge), tiny), d, to.edge);
+  hn::Store(hn::MulAdd(hn::Mul(area, reach), hn::Set(d, 0x1p-15f), tiny), d, to.plane);
+  hn::Store(hn::Mul(reach, hn::Set(d, p.ahead)), d, to.ahead);
+}
+
+// Whether any of eight rays may hit the triangle.
+HWY_ATTR HWY_INLINE bool candidate(const Packet& p, std::uint32_t first, const LeafVolumes& of,
+                                   std::uint32_t place) {
+  const Floats d;
+  using V = hn::Vec<Floats>;
+  const V dx = hn::Load(d, p.direction[0] + first), dy = hn::Load(d, p.direction[1] + first);
+  const V dz = hn::Load(d, p.direction[2] + first);
+  const auto dot = [&](const float(*with)[8]) HWY_ATTR {
+    return hn::MulAdd(
+        hn::Set(d, with[0][place]), dx,
+        hn::MulAdd(hn::Set(d, with[1][place]), dy, hn::Mul(hn::Set(d, with[2][place]), dz)));
+  };
+  const V volume = dot(of.normal), u = dot(of.u), v = dot(of.v);
+  const V w = hn::Sub(hn::Sub(volume, u), v);
+  const V edge = hn::Set(d, of.edge[place]), plane = hn::Set(d, of.plane[place]);
+  const V ahead = hn::Set(d, of.ahead[place]);
+  const V sign = hn::And(volume, hn::Set(d, -0.0f));
+  const V distance = hn::Xor(hn::Set(d, of.distance[place]), sign);
+  const V size = hn::Xor(volume, sign);
+  const V from = hn::MulSub(size, hn::Sub(hn::Load(d, p.tmin + first), ahead), plane);
+  const V to = hn::MulAdd(size, hn::Add(hn::Load(d, p.tmax + first), ahead), plane);
+  const auto beside = hn::And(hn::Lt(hn::Min(hn::Min(u, v), w), hn::Neg(edge)),
+                              hn::Gt(hn::Max(hn::Max(u, v), w), edge));
+  const auto missed = hn::Or(beside, hn::Or(hn::Lt(distance, from), hn::Gt(distance, to)));
+  return !hn::AllTrue(d, missed);
 }
 
 // intersect_triangle() for one triangle and eight rays from `first` on.
@@ -294,9 +374,12 @@ HWY_ATTR HWY_INLINE std::uint32_t visit_leaf(const WideView& tree, const SceneVi
   hn::StoreMaskBits(d, meet(p, enter, leave, tmin, &near), bits);
   bool changed = false;
   const std::uint32_t tested = bits[0] & ((1u << n) - 1u);
+  LeafVolumes volumes;
+  if (p.one_origin && tested != 0) prepare(p, rows, n, volumes);
   for (std::uint32_t left = tested; left != 0; left &= left - 1) {
     const auto place = static_cast<std::uint32_t>(lowest_bit(left));
     for (std::uint32_t first = 0; first < kPacketRays; first += 8) {
+      if (p.one_origin && !candidate(p, first, volumes, place)) continue;
       changed |= test(scene, params, p, first, rows, n, place);
     }
   }
@@ -309,16 +392,29 @@ HWY_ATTR HWY_INLINE std::uint32_t visit_leaf(const WideView& tree, const SceneVi
   return count;
 }
 
+// By insertion: there are few. Of equal distances the last one comes first, as with single rays.
+HWY_ATTR HWY_INLINE void sort_far_to_near(Packet& p, std::uint32_t first, std::uint32_t end) {
+  for (std::uint32_t i = first + 1; i < end; ++i) {
+    const float t = p.stack_t[i];
+    const WideRef ref = p.stack_ref[i];
+    std::uint32_t place = i;
+    for (; place > first && p.stack_t[place - 1] < t; --place) {
+      p.stack_t[place] = p.stack_t[place - 1];
+      p.stack_ref[place] = p.stack_ref[place - 1];
+    }
+    p.stack_t[place] = t;
+    p.stack_ref[place] = ref;
+  }
+}
+
 // Closest hits of rays[0, count), count <= kPacketRays. False: they are too far apart for a packet,
 // and no hits are written.
 HWY_ATTR HWY_INLINE bool trace_packet(const WideView& tree, const SceneView& scene,
                                       const RenderParams& params, const Ray* rays,
                                       std::uint32_t count, Packet& p, Hit* hits) {
-  if (!begin(rays, count, p)) return false;
+  if (!begin(tree, rays, count, p)) return false;
   const Floats d;
   const Words du;
-  const auto order = hn::SetTableIndices(d, kFarToNear[p.octant]);
-  const auto order_u = hn::SetTableIndices(du, kFarToNear[p.octant]);
   p.stack_t[0] = p.beam_tmin;
   p.stack_ref[0] = 0;
   std::uint32_t depth = 1;
@@ -339,15 +435,13 @@ HWY_ATTR HWY_INLINE bool trace_packet(const WideView& tree, const SceneView& sce
       enter[axis] = hn::Load(d, reinterpret_cast<const float*>(bytes + p.enter[axis]));
       leave[axis] = hn::Load(d, reinterpret_cast<const float*>(bytes + (p.enter[axis] ^ 32)));
     }
-    // The mask must follow the lanes: an empty interval is one that begins at infinity.
     const auto met = meet(p, enter, leave, tmin, &near);
-    const auto none = hn::Set(d, std::numeric_limits<float>::infinity());
-    const auto sorted = hn::TableLookupLanes(hn::IfThenElse(met, near, none), order);
-    const auto kept = hn::Lt(sorted, none);
-    const auto child = hn::TableLookupLanes(hn::Load(du, node.child), order_u);
-    hn::StoreU(hn::Compress(sorted, kept), d, p.stack_t + depth);
-    hn::StoreU(hn::Compress(child, hn::RebindMask(du, kept)), du, p.stack_ref + depth);
-    depth += static_cast<std::uint32_t>(hn::CountTrue(d, kept));
+    hn::StoreU(hn::Compress(near, met), d, p.stack_t + depth);
+    hn::StoreU(hn::Compress(hn::Load(du, node.child), hn::RebindMask(du, met)), du,
+               p.stack_ref + depth);
+    const std::uint32_t end = depth + static_cast<std::uint32_t>(hn::CountTrue(d, met));
+    sort_far_to_near(p, depth, end);
+    depth = end;
   }
   for (std::uint32_t i = 0; i < count; ++i) hits[i] = {p.t[i], p.u[i], p.v[i], p.triangle[i]};
   return true;
