@@ -15,6 +15,7 @@
 #include "tests/bench/hits.h"
 #include "tests/bench/octrace_tracer.h"
 #include "tests/bench/ray_gpu.h"
+#include "tests/bench/ray_race.h"
 #include "tests/bench/ray_sets.h"
 #include "tests/bench/statistics.h"
 
@@ -28,22 +29,10 @@ struct Options {
   std::vector<std::string> scenes;
   std::string camera, size = "1280x720", peer, json, builder = "sah", device = "cpu";
   std::vector<std::string> sets = {"primary", "bounce", "ao"};
-  unsigned threads = 1;
+  unsigned threads = 1, scaling = 0;
   int repeats = 5;
   bool count = false;
 };
-
-const char* name_of(EmbreePeer::Interface interface) {
-  switch (interface) {
-    case EmbreePeer::Interface::single:
-      return "single";
-    case EmbreePeer::Interface::packet:
-      return "packet";
-    case EmbreePeer::Interface::stream:
-      return "stream";
-  }
-  return "";
-}
 
 class SceneBench {
  public:
@@ -87,35 +76,26 @@ class SceneBench {
   }
 
  private:
+  // False where too few hits agree with the peer's.
   bool run_set(const Rays& rays, nlohmann::json& rows) {
-    const bool coherent = rays.set == RaySet::primary;
-    std::vector<kernels::Hit> ours;
-    trace_cpu(scene_, octree_, wide_, rays.rays, rays.any_hit, coherent, options_.threads, &ours);
-    std::vector<EmbreePeer::Interface> interfaces;
-    if (peer_) {
-      interfaces = {EmbreePeer::Interface::single, EmbreePeer::Interface::packet,
-                    EmbreePeer::Interface::stream};
-      std::vector<kernels::Hit> theirs;
-      peer_->trace(rays.rays, rays.any_hit, interfaces[0], options_.threads, &theirs);
-      const double agreeing = agreement(ours, theirs, rays.any_hit);
-      if (agreeing < kLeastAgreement) {
-        fmt::print(stderr,
-                   "octrace-bench: {} {}: hits agree with Embree's on only {:.4f} % of the rays\n",
-                   name_, bench::name_of(rays.set), 100.0 * agreeing);
-        return false;
-      }
+    const Race result = race({scene_, octree_, wide_, peer_ ? &*peer_ : nullptr}, rays,
+                             {options_.threads, options_.scaling, options_.repeats});
+    if (!agrees(result)) {
+      fmt::print(stderr,
+                 "octrace-bench: {} {}: hits agree with Embree's on only {:.4f} % of the rays\n",
+                 name_, bench::name_of(rays.set), 100.0 * result.agreement);
+      return false;
     }
-    std::vector<double> own;
-    std::vector<std::vector<double>> peers(interfaces.size());
-    for (int i = 0; i < options_.repeats; ++i) {  // turn about, so that both see the same machine
-      own.push_back(trace_cpu(scene_, octree_, wide_, rays.rays, rays.any_hit, coherent,
-                              options_.threads, nullptr));
-      for (std::size_t k = 0; k < interfaces.size(); ++k) {
-        peers[k].push_back(
-            peer_->trace(rays.rays, rays.any_hit, interfaces[k], options_.threads, nullptr));
-      }
+    nlohmann::json row = race_row(name_, result);
+    row["builder"] = options_.builder;
+    if (options_.count) {
+      const Work work = count_work(scene_, octree_, rays.rays, rays.any_hit);
+      row["nodes_per_ray"] = work.nodes;
+      row["triangles_per_ray"] = work.triangles;
     }
-    report(rays, own, interfaces, peers, rows);
+    fmt::print("{}\n", race_line(row));
+    std::fflush(stdout);
+    rows.push_back(row);
     return true;
   }
 
@@ -151,6 +131,7 @@ class SceneBench {
     rows.push_back({{"scene", name_},
                     {"set", bench::name_of(rays.set)},
                     {"device", "cuda"},
+                    {"builder", options_.builder},
                     {"device_name", gpu_->name()},
                     {"rays", rays.rays.size()},
                     {"launches", seconds.size()},
@@ -159,51 +140,6 @@ class SceneBench {
                     {"mrays_per_s_lowest", mrays(spread.highest)},
                     {"differing_hits", differing}});
     return true;
-  }
-
-  void report(const Rays& rays, const std::vector<double>& own,
-              const std::vector<EmbreePeer::Interface>& interfaces,
-              const std::vector<std::vector<double>>& peers, nlohmann::json& rows) const {
-    const auto mrays = [&](double seconds) {
-      return seconds > 0.0 ? static_cast<double>(rays.rays.size()) / seconds * 1e-6 : 0.0;
-    };
-    const Spread spread = spread_of(own);
-    nlohmann::json row = {{"scene", name_},
-                          {"set", bench::name_of(rays.set)},
-                          {"device", "cpu"},
-                          {"threads", options_.threads},
-                          {"rays", rays.rays.size()},
-                          {"mrays_per_s", mrays(spread.median)},
-                          {"mrays_per_s_lowest", mrays(spread.highest)},
-                          {"mrays_per_s_highest", mrays(spread.lowest)}};
-    std::string line = fmt::format("{:<24} {:<8} {:8.2f} [{:.2f}, {:.2f}] Mrays/s", name_,
-                                   bench::name_of(rays.set), mrays(spread.median),
-                                   mrays(spread.highest), mrays(spread.lowest));
-    if (options_.count) {
-      const Work work = count_work(scene_, octree_, rays.rays, rays.any_hit);
-      row["nodes_per_ray"] = work.nodes;
-      row["triangles_per_ray"] = work.triangles;
-      line += fmt::format(", {:.1f} nodes {:.1f} triangles a ray", work.nodes, work.triangles);
-    }
-    double best = 0.0;
-    for (std::size_t k = 0; k < interfaces.size(); ++k) {
-      const double rate = mrays(spread_of(peers[k]).median);
-      row["peer_" + std::string(name_of(interfaces[k])) + "_mrays_per_s"] = rate;
-      if (rate > best) {
-        best = rate;
-        row["peer_interface"] = name_of(interfaces[k]);
-      }
-    }
-    if (best > 0.0) {
-      row["peer"] = "embree";
-      row["peer_mrays_per_s"] = best;
-      row["ratio"] = mrays(spread.median) / best;
-      line += fmt::format(", Embree {:.2f} ({}), ratio {:.2f}", best,
-                          row["peer_interface"].get<std::string>(), mrays(spread.median) / best);
-    }
-    fmt::print("{}\n", line);
-    std::fflush(stdout);
-    rows.push_back(row);
   }
 
   const Options& options_;
@@ -282,6 +218,10 @@ void add_rays_command(CLI::App& app, int& exit_code) {
   command->add_option("--threads", options->threads, "CPU threads")
       ->check(CLI::Range(1u, 4096u))
       ->capture_default_str();
+  command
+      ->add_option("--scaling", options->scaling,
+                   "Also trace with octrace on this many CPU threads, in the same turns")
+      ->check(CLI::Range(1u, 4096u));
   command->add_option("--builder", options->builder, "Octree builder")
       ->check(CLI::IsMember({"hploc", "median", "sah", "quality"}))
       ->capture_default_str();

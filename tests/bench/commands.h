@@ -11,7 +11,9 @@ namespace octrace::bench {
 
 void add_rays_command(CLI::App& app, int& exit_code);
 void add_build_command(CLI::App& app, int& exit_code);
+void add_growth_command(CLI::App& app, int& exit_code);
 void add_paper_command(CLI::App& app, int& exit_code);
+void add_about_command(CLI::App& app, int& exit_code);
 
 int fail(const util::Error& error);  // prints it; returns its exit code
 int write_json(const std::string& path, const nlohmann::json& rows);  // nothing where path is empty

@@ -9,13 +9,15 @@ struct EmbreePeer::Impl {};
 
 bool EmbreePeer::available() { return false; }
 
+std::string EmbreePeer::version() { return ""; }
+
 EmbreePeer::EmbreePeer(const scene::Scene&, Quality, unsigned) {
   throw std::logic_error("built without Embree");
 }
 
 EmbreePeer::~EmbreePeer() = default;
 
-double EmbreePeer::trace(const std::vector<kernels::Ray>&, bool, Interface, unsigned,
+double EmbreePeer::trace(const std::vector<kernels::Ray>&, bool, bool, Interface, unsigned,
                          std::vector<kernels::Hit>*) const {
   throw std::logic_error("built without Embree");
 }

@@ -115,6 +115,8 @@ struct EmbreePeer::Impl {
 
 bool EmbreePeer::available() { return true; }
 
+std::string EmbreePeer::version() { return RTC_VERSION_STRING; }
+
 EmbreePeer::EmbreePeer(const scene::Scene& scene, Quality quality, unsigned threads)
     : impl_(std::make_unique<Impl>()) {
   const std::string config = "threads=" + std::to_string(threads) + ",user_threads=0";
@@ -144,12 +146,12 @@ EmbreePeer::~EmbreePeer() {
   rtcReleaseDevice(impl_->device);
 }
 
-double EmbreePeer::trace(const std::vector<kernels::Ray>& rays, bool any_hit, Interface interface,
-                         unsigned threads, std::vector<kernels::Hit>* hits) const {
+double EmbreePeer::trace(const std::vector<kernels::Ray>& rays, bool any_hit, bool coherent,
+                         Interface interface, unsigned threads,
+                         std::vector<kernels::Hit>* hits) const {
   std::vector<RTCRayHit> converted;
   converted.reserve(rays.size());
   for (const kernels::Ray& ray : rays) converted.push_back(to_embree(ray));
-  const bool coherent = interface != Interface::single;
   const double start = seconds_now(threads);
   tbb::task_arena(static_cast<int>(threads)).execute([&] {
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, rays.size(), kGrain),

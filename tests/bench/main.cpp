@@ -31,12 +31,14 @@ bool parse_size(const std::string& text, int* width, int* height) {
 }  // namespace octrace::bench
 
 int main(int argc, char** argv) {
-  CLI::App app("Measures octrace: rays, octree builds and the seed paper's experiment");
+  CLI::App app("Measures octrace: rays, octree builds, growth and the seed paper's experiment");
   app.require_subcommand(1);
   int exit_code = 0;
   octrace::bench::add_rays_command(app, exit_code);
   octrace::bench::add_build_command(app, exit_code);
+  octrace::bench::add_growth_command(app, exit_code);
   octrace::bench::add_paper_command(app, exit_code);
+  octrace::bench::add_about_command(app, exit_code);
   CLI11_PARSE(app, argc, argv);
   return exit_code;
 }

@@ -59,6 +59,11 @@ double round_step(double range, int most) {
   return power * 10.0;
 }
 
+std::string short_number(double value) {
+  if (value >= 1e6) return fmt::format("{:.3g}M", value * 1e-6);
+  return value >= 1e3 ? fmt::format("{:.3g}k", value * 1e-3) : fmt::format("{:.3g}", value);
+}
+
 class Axis {
  public:
   Axis(const Chart& chart) : log_(chart.log_y) {
@@ -125,9 +130,11 @@ std::string draw_series(const ChartSeries& series, const Axis& axis, const auto&
 std::string draw_chart(const Chart& chart, double left) {
   const Axis axis(chart);
   const double bottom = kTop + kHeight;
-  const double first = chart.x_ticks.front(), last = chart.x_ticks.back();
+  const auto scaled = [&](double x) { return chart.log_x ? std::log(x) : x; };
+  const double first = scaled(chart.x_ticks.front()), last = scaled(chart.x_ticks.back());
   const auto x_at = [&](double x) {
-    return left + 16.0 + (kWidth - 32.0) * (last == first ? 0.5 : (x - first) / (last - first));
+    const double share = last == first ? 0.5 : (scaled(x) - first) / (last - first);
+    return left + 16.0 + (kWidth - 32.0) * share;
   };
   std::string svg = text_at(left + kWidth / 2, kTop - 14, "middle", 14, chart.title);
   for (const double tick : axis.ticks()) {
@@ -137,7 +144,8 @@ std::string draw_chart(const Chart& chart, double left) {
   }
   for (const double tick : chart.x_ticks) {
     svg += line(x_at(tick), bottom, x_at(tick), bottom + 5, "stroke=\"#333333\"");
-    svg += text_at(x_at(tick), bottom + 19, "middle", 12, fmt::format("{:.6g}", tick));
+    svg += text_at(x_at(tick), bottom + 19, "middle", 12,
+                   chart.log_x ? short_number(tick) : fmt::format("{:.6g}", tick));
   }
   svg += fmt::format(
       "<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{:.1f}\" "

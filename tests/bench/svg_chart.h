@@ -21,6 +21,7 @@ struct Chart {
   std::vector<double> x_ticks;  // the axis runs from the first to the last, also downwards
   bool log_y = false;
   std::vector<ChartSeries> series;  // those without points stand in the legend as "not measured"
+  bool log_x = false;               // ticks then read as 131k, 2.1M
 };
 
 // Charts side by side, a title above, lines of notes below.
