@@ -137,7 +137,8 @@ HWY_ATTR HWY_INLINE ObjectSplit best_split(const ObjectBins& bins, int count) {
       hn::MinOfLanes(kTag, hn::IfThenElse(hn::Eq(least, cost), where, hn::Set(kTag, kInfinity)));
   ObjectSplit split;
   split.cost = hn::GetLane(cost);
-  if (split.cost < kInfinity) {
+  // Some instruction sets' least of infinities is the largest number.
+  if (split.cost < std::numeric_limits<float>::max()) {
     const auto at = static_cast<int>(hn::GetLane(first));
     split.axis = at / kMaxBins;
     split.bin = at % kMaxBins;

@@ -37,7 +37,8 @@ inline scene::Scene flattened(const Parts& parts) { return flattened(parts.glb()
 
 template <class T>
 bool same_bits(const std::vector<T>& a, const std::vector<T>& b) {
-  return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(T)) == 0;
+  return a.size() == b.size() &&
+         (a.empty() || std::memcmp(a.data(), b.data(), a.size() * sizeof(T)) == 0);
 }
 
 inline void expect_same_arrays(const scene::Scene& a, const scene::Scene& b) {
