@@ -364,7 +364,7 @@ void declare_options(CLI::App& command, ValidateRequest& request) {
   command
       .add_option("--keys", request.keys,
                   "instead of one time, N key times of each animation (or of --animation); 0: all")
-      ->check(CLI::NonNegativeNumber)
+      ->check(CLI::Range(0, 1 << 30).description(""))
       ->excludes("--time")
       ->excludes("--frame")
       ->type_name("N");
