@@ -17,6 +17,7 @@
 #include "backend/batch/state.h"
 #include "backend/batch/view_record.h"
 #include "backend/batch/view_writer.h"
+#include "backend/image/image.h"
 #include "backend/render/tiles.h"
 #include "backend/util/interrupt.h"
 #include "backend/util/version.h"
@@ -340,6 +341,7 @@ Result<RunSummary> run_plan(const Plan& plan, const RunOptions& options) {
   }
   if (auto flushed = journal->flush(); !flushed) return flushed.error();
   if (summary.standing.left() > 0) {
+    image::request_threads(1);  // writers run side by side: a thread each is enough
     Run(plan, options, *done, *journal, summary).run();
   }
   const ordered_json last = {{"kind", "end"},

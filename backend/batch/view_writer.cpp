@@ -9,7 +9,6 @@
 #include "backend/batch/camera_choice.h"
 #include "backend/batch/output.h"
 #include "backend/batch/view_record.h"
-#include "backend/image/image.h"
 #include "backend/util/grouped_commit.h"
 #include "backend/util/interrupt.h"
 #include "backend/util/process.h"
@@ -131,11 +130,6 @@ ViewWriter::Outcome ViewWriter::outcome() const {
 }
 
 void ViewWriter::work() {
-  // Writers run side by side: a thread each is enough. Here, because it waits for the image
-  // library, which loads while the first view is traced.
-  if (needs_image_library(plan_.files(plan_.view(0)))) {
-    if (auto set = image::set_threads(1); !set) stop(set.error());
-  }
   for (;;) {
     std::unique_lock lock(mutex_);
     changed_.wait(lock, [&] { return closed_ || !queue_.empty(); });

@@ -8,6 +8,8 @@
 #include <atomic>
 #include <cstring>
 #include <filesystem>
+#include <mutex>
+#include <optional>
 #include <thread>
 
 #include "backend/image/module.h"
@@ -67,8 +69,20 @@ Loaded load() {
 
 std::atomic<bool> preload_begun{false};
 
+std::mutex threads_mutex;
+std::optional<unsigned> requested_threads;
+const ModuleTable* ready = nullptr;
+
+Loaded load_with_threads() {
+  Loaded loaded = load();
+  const std::lock_guard lock(threads_mutex);
+  ready = loaded.table;
+  if (ready != nullptr && requested_threads) ready->set_threads(*requested_threads);
+  return loaded;
+}
+
 const Loaded& module() {
-  static const Loaded loaded = load();
+  static const Loaded loaded = load_with_threads();
   return loaded;
 }
 
@@ -107,6 +121,12 @@ util::Result<void> set_threads(unsigned threads) {
   if (loaded.table == nullptr) return loaded.error;
   loaded.table->set_threads(threads);
   return {};
+}
+
+void request_threads(unsigned threads) {
+  const std::lock_guard lock(threads_mutex);
+  requested_threads = threads;
+  if (ready != nullptr) ready->set_threads(threads);
 }
 
 util::Result<void> write_exr(const std::string& path, const ImageView& image) {

@@ -59,6 +59,9 @@ void preload();  // starts loading the image library in the background; optional
 void finish_preload();
 // The library's own threads, which compress and decompress (0: all cores). Waits for its loading.
 util::Result<void> set_threads(unsigned threads);
+// The same without waiting: they are set before the first image is read or written. Not beside
+// other calls: the library's threads cannot be changed while it is used.
+void request_threads(unsigned threads);
 
 // Every writer: the file is whole or absent (temporary name in the same folder, flushed, renamed).
 util::Result<void> write_exr(const std::string& path, const ImageView& image);

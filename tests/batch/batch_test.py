@@ -381,6 +381,14 @@ class Failures(BatchCase):
         self.assertIn("there is no camera nobody", err)
         self.assertEqual(len(self.outputs()), 2)
 
+    def test_many_writers_begin_together(self):
+        # The image library's threads must not be changed by each of them.
+        self.job(cameras=[{"turntable": {"n": 60, "elevation": 20}}], aovs=["Z", "mask"], size=[64, 48],
+                 output="out/{camera}.exr")
+        for _ in range(12):
+            self.run_batch("--force", "--threads", "16")
+        self.assertEqual(len(self.outputs()), 60)
+
     def test_hostile_names_stay_in_their_place(self):
         for name in ("../../x", "/etc/x", ".", "..", "a/b\\c", "x" * 500, "-rf", "caf\u00e9"):
             self.job(scenes=[{"path": "a.gltf", "name": name}],
