@@ -11,7 +11,8 @@ namespace {
 
 void set_library_threads(unsigned threads) {
   OIIO::attribute("threads", static_cast<int>(threads));
-  OIIO::attribute("exr_threads", static_cast<int>(threads));
+  // One thread is the caller's own: a pool of one would compress all writers' files in turn.
+  OIIO::attribute("exr_threads", threads == 1 ? -1 : static_cast<int>(threads));
 }
 
 const ModuleTable kTable = {util::version(),    set_library_threads, write_exr_file,
