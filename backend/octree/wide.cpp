@@ -343,13 +343,15 @@ class Widener {
     gather(node, children);
     open(children);
 
-    // Where their order is left open, the last slot comes first: leaves before nodes and the larger
-    // before the smaller, so that whatever stops a ray is found soon.
+    // Where their order is left open, and among boxes that hold the ray's origin, the last slot
+    // comes first: leaves, the largest of them to begin with, because any of them may end the walk;
+    // then nodes, the smallest to begin with, because what lies around the origin is met soonest
+    // there.
     const auto smaller = [](const auto& a, const auto& b) {
       return a.box.half_area() < b.box.half_area();
     };
-    std::stable_sort(children.inner.begin(), children.inner.begin() + children.inner_count,
-                     smaller);
+    const auto larger = [&](const auto& a, const auto& b) { return smaller(b, a); };
+    std::stable_sort(children.inner.begin(), children.inner.begin() + children.inner_count, larger);
     std::stable_sort(children.leaves.begin(), children.leaves.begin() + children.leaf_count,
                      smaller);
     Box bounds;
