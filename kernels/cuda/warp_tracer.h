@@ -222,7 +222,8 @@ __device__ OCTRACE_FORCE_INLINE std::uint64_t take_rays(unsigned idle, unsigned 
   return first + rank(idle, lane);
 }
 
-// Source: count(); load(index) -> Ray; store(index, Hit) once for each.
+// Source: count(); load(index) -> Ray; prefetch(index), a hint before that index is loaded;
+// store(index, Hit) once for each.
 template <bool kAnyHit, int kRefill, class Source>
 __device__ OCTRACE_FORCE_INLINE void trace_rays(const SceneView& scene, const RenderParams& params,
                                                 const Source& source, WarpShared& shared,
