@@ -171,6 +171,7 @@ class CpuRenderer final : public Renderer {
   kernels::InstancedSceneView scene_;
   octree::WideOctree wide_;
   kernels::CpuTracer tracer_;
+  TileRunner tiles_;
 };
 
 util::Result<TraceStats> CpuRenderer::render(const kernels::RayCamera& camera,
@@ -218,7 +219,7 @@ util::Result<TraceStats> CpuRenderer::render(const kernels::RayCamera& camera,
     if (result.status != TraceStatus::ok) failure = result;
     return result.status == TraceStatus::ok;
   };
-  switch (run_tiles(job)) {
+  switch (tiles_.run(job)) {
     case TileOutcome::failed:
       return trace_error(failure);
     case TileOutcome::cancelled:

@@ -19,23 +19,21 @@ Tile tile_at(const TileJob& job, std::uint64_t columns, std::uint32_t side, std:
           static_cast<std::uint32_t>(std::min<std::uint64_t>(y0 + side, job.height))};
 }
 
-// One arena for all images that a thread has traced: many views leave none behind.
-tbb::task_arena& arena_of(unsigned threads) {
-  thread_local tbb::task_arena arena;
-  if (!arena.is_active() || arena.max_concurrency() != static_cast<int>(threads)) {
-    arena.terminate();
-    arena.initialize(static_cast<int>(threads));
-  }
-  return arena;
-}
-
 }  // namespace
 
 unsigned effective_threads(unsigned threads) {
   return threads != 0 ? threads : static_cast<unsigned>(tbb::info::default_concurrency());
 }
 
-TileOutcome run_tiles(const TileJob& job) {
+tbb::task_arena& TileRunner::arena(unsigned threads) {
+  if (!arena_.is_active() || arena_.max_concurrency() != static_cast<int>(threads)) {
+    arena_.terminate();
+    arena_.initialize(static_cast<int>(threads));
+  }
+  return arena_;
+}
+
+TileOutcome TileRunner::run(const TileJob& job) {
   const std::uint32_t side = std::max(job.tile, 1u);
   const std::uint64_t columns = (static_cast<std::uint64_t>(job.width) + side - 1) / side;
   const std::uint64_t rows = (static_cast<std::uint64_t>(job.height) + side - 1) / side;
@@ -67,7 +65,7 @@ TileOutcome run_tiles(const TileJob& job) {
   // Without this, an arena gets no more threads than the machine has cores.
   const tbb::global_control allow(tbb::global_control::max_allowed_parallelism,
                                   std::max<std::size_t>(threads, effective_threads(0)));
-  arena_of(threads).execute([&] {
+  arena(threads).execute([&] {
     tbb::parallel_for(std::uint64_t{0}, columns * rows, run_one, tbb::simple_partitioner{});
   });
   if (failed) return TileOutcome::failed;

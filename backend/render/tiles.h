@@ -2,6 +2,8 @@
 // on which thread does it or when, so that images are the same for any thread count and tile size.
 #pragma once
 
+#include <oneapi/tbb/task_arena.h>
+
 #include <atomic>
 #include <cstdint>
 #include <functional>
@@ -31,7 +33,19 @@ struct TileJob {
 
 enum class TileOutcome { done, failed, cancelled };
 
-TileOutcome run_tiles(const TileJob& job);
+// One thread at a time. All jobs share an arena, so that many views leave none behind. It is not a
+// thread_local: registering its destructor would wait for the dynamic loader, which may be at work
+// on the image library for 200 ms (image::preload).
+class TileRunner {
+ public:
+  TileOutcome run(const TileJob& job);
+
+ private:
+  tbb::task_arena& arena(unsigned threads);
+
+  tbb::task_arena arena_;
+};
+
 unsigned effective_threads(unsigned threads);
 
 }  // namespace octrace::render
