@@ -1,0 +1,57 @@
+#!/usr/bin/env python3
+"""Writes the libraries that a shared library needs and that have many symbols to bind, those first that others
+need: the order in which image.cpp opens them.
+
+    library_order.py LIBRARY OUTPUT.inc
+"""
+import re
+import subprocess
+import sys
+
+# Symbols to bind from which a library is worth a place.
+MANY = 1500
+RELOCATION = 24  # bytes of an Elf64_Rela
+
+
+def output_of(*command):
+    return subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True).stdout
+
+
+def dynamic_sections(paths):
+    """By path: the libraries needed, and how many relocations name a symbol."""
+    sections = {}
+    text = output_of("readelf", "-dW", *paths)
+    for part in re.split(r"^File: ", text, flags=re.M)[1:] if len(paths) > 1 else [paths[0] + "\n" + text]:
+        def number(tag):
+            found = re.search(r"\(%s\)\s+(\d+)" % tag, part)
+            return int(found[1]) if found else 0
+
+        relocations = (number("RELASZ") + number("PLTRELSZ")) // RELOCATION - number("RELACOUNT")
+        sections[part.split("\n", 1)[0]] = (re.findall(r"\(NEEDED\).*\[(.*)\]", part), relocations)
+    return sections
+
+
+def main():
+    library, output = sys.argv[1:]
+    paths = dict(re.findall(r"^\s*(\S+) => (/\S+)", output_of("ldd", library), re.M))
+    sections = dynamic_sections([library, *paths.values()])
+    order = []
+
+    def visit(name, path):
+        if name in visited:
+            return
+        visited.add(name)
+        needed, relocations = sections[path]
+        for other in needed:
+            if other in paths:
+                visit(other, paths[other])
+        if relocations >= MANY and path != library:
+            order.append(name)
+
+    visited = set()
+    visit(library.rsplit("/", 1)[-1], library)
+    with open(output, "w") as file:
+        file.writelines('"%s",\n' % name for name in order)
+
+
+main()
