@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -43,7 +44,8 @@ class SceneBench {
         octree_(std::move(octree)),
         wide_(octree::make_wide(octree_.view())) {
     if (options.peer == "embree") {
-      peer_.emplace(scene_, EmbreePeer::Quality::high, options.threads);
+      // Embree's device limits oneTBB's threads for the whole process, octrace's with them.
+      peer_.emplace(scene_, EmbreePeer::Quality::high, std::max(options.threads, options.scaling));
     }
   }
 
