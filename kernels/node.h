@@ -65,6 +65,9 @@ inline constexpr std::uint32_t kBlend = 4;      // alpha mode BLEND: shadow rays
 struct OctreeView {
   Span<Node> nodes;  // the root is node 0; empty: nothing to hit
   Span<LeafTriangle> triangles;
+  // Triangles were cut, so that siblings overlap little. Any tree may be walked either way: it only
+  // says which is faster on a GPU (kernels/cuda/warp_tracer.h).
+  bool cut = false;
 };
 
 }  // namespace octrace::kernels

@@ -21,6 +21,9 @@ BinaryOptions binary_options(bool quality) {
   return options;
 }
 
+// Share of triangles from which a tree counts as one with cuts.
+constexpr double kManyCuts = 0.01;
+
 ReinsertOptions reinsert_options(bool quality) {
   ReinsertOptions options;
   // Most scenes have nothing to gain (under 0.06 of the root's surface); where there is, as in
@@ -41,7 +44,10 @@ void build_sah(const BuildInput& input, std::uint32_t leaf_triangles, bool quali
   {
     BinaryTree tree = build_binary(input, binary_options(quality));
     reinsert(tree, reinsert_options(quality));
-    if (collapse(tree, leaf_triangles, input, octree)) return;
+    if (collapse(tree, leaf_triangles, input, octree)) {
+      octree.cut = octree.triangles.size() > input.triangles.size() * (1.0 + kManyCuts);
+      return;
+    }
   }
   // Too deep: halves by rank need at most 32 binary levels, so fewer eight-way ones.
   BinaryOptions plain;

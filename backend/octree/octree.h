@@ -37,10 +37,11 @@ struct Statistics {
 struct Octree {
   std::vector<kernels::Node> nodes;
   std::vector<kernels::LeafTriangle> triangles;
+  bool cut = false;          // more than a few triangles were cut and lie in several leaves
   InstanceLevels instances;  // empty where the scene has none
 
   kernels::OctreeView view() const {
-    return {{nodes.data(), nodes.size()}, {triangles.data(), triangles.size()}};
+    return {{nodes.data(), nodes.size()}, {triangles.data(), triangles.size()}, cut};
   }
 };
 

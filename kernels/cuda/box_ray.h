@@ -51,6 +51,10 @@ struct ChildMask {
   std::uint32_t hit;  // bit s: the ray meets the box in slot s
   std::uint32_t inner_mask, first_child, first_triangle;
   std::uint32_t meta[2];
+  // Of the inner children met, if the test was asked to order them: the slot of the one entered
+  // first, and a distance before any other is entered.
+  std::uint32_t nearest;
+  float others;
 };
 
 // What Node::exponent stands for, from its byte in the high bits of a word.
@@ -91,6 +95,7 @@ __device__ OCTRACE_FORCE_INLINE BoxRay make_box_ray(const SlabRay& ray, const No
 class ChildTest {
  public:
   // The node's children that the ray may meet between 0 and tmax.
+  template <bool kOrder>
   __device__ OCTRACE_FORCE_INLINE static ChildMask test(const Node& node, const BoxRay& ray,
                                                         float tmax) {
     const uint4* p = reinterpret_cast<const uint4*>(&node);
@@ -108,8 +113,9 @@ class ChildTest {
     const float t0 = __int_as_float(__vimax3_s32_relu(
         __float_as_int(x.entry), __float_as_int(y.entry), __float_as_int(z.entry)));
     // The summand keeps it finite where a node is a point.
-    const float unit = reciprocal(fma_rn(fmaxf(fmaxf(fabsf(x.step), fabsf(y.step)), fabsf(z.step)),
-                                         1.0f / kSteepest, 1e-35f));
+    const float tick =
+        fma_rn(fmaxf(fmaxf(fabsf(x.step), fabsf(y.step)), fabsf(z.step)), 1.0f / kSteepest, 1e-35f);
+    const float unit = reciprocal(tick);
     const float near0 = fma_rn(-t0, unit, -kHalfError), far0 = fma_rn(-t0, unit, kHalfError);
     const __half2 near_x = halves(x.step * unit, fma_rn(x.near, unit, near0));
     const __half2 near_y = halves(y.step * unit, fma_rn(y.near, unit, near0));
@@ -125,11 +131,28 @@ class ChildTest {
                         nx ? n2.x : n3.z, ny ? n2.z : n4.x, nz ? n3.x : n4.z};
     const Planes high = {nx ? n3.w : n2.y, ny ? n4.y : n2.w, nz ? n4.w : n3.y,
                          nx ? n2.y : n3.w, ny ? n2.w : n4.y, nz ? n3.y : n4.w};
+    const Met a = meets(frame, even(low)), b = meets(frame, odd(low)), c = meets(frame, even(high)),
+              d = meets(frame, odd(high));
     // Slots 0 and 4 are at bits 0 and 4 of the lower halves, 2 and 6 at theirs of the upper ones.
-    const std::uint32_t hit =
-        (meets(frame, even(low)) & 0x00040001u) | (meets(frame, odd(low)) & 0x00080002u) |
-        (meets(frame, even(high)) & 0x00400010u) | (meets(frame, odd(high)) & 0x00800020u);
-    return {(hit | hit >> 16) & 0xffu, n0.w >> 24, n1.x, n1.y, {n1.z, n1.w}};
+    const std::uint32_t hit = (a.mask & 0x00040001u) | (b.mask & 0x00080002u) |
+                              (c.mask & 0x00400010u) | (d.mask & 0x00800020u);
+    ChildMask children = {(hit | hit >> 16) & 0xffu, n0.w >> 24, n1.x, n1.y, {n1.z, n1.w}, 0, 0.0f};
+    if constexpr (kOrder) {
+      const std::uint32_t inner = children.inner_mask;
+      const std::uint32_t inner_low = sign_bits(inner & 15u), inner_high = sign_bits(inner >> 4);
+      const Least least = least_two(key(a, spread_signs<0xaa88>(inner_low), 0x00020000u),
+                                    key(b, spread_signs<0xbb99>(inner_low), 0x00030001u),
+                                    key(c, spread_signs<0xaa88>(inner_high), 0x00060004u),
+                                    key(d, spread_signs<0xbb99>(inner_high), 0x00070005u));
+      children.nearest = least.first & 7u;
+      // Taking 8 off a key leaves a half below the entry distance's own, and so below the exact
+      // distance that was rounded to it. Not a number, so below nothing, where there is no second
+      // child or it is entered at once.
+      const float second =
+          __half2float(__ushort_as_half(static_cast<unsigned short>(least.second - 8u)));
+      children.others = __fmaf_rd(second, tick * (1.0f - 0x1p-20f), t0);
+    }
+    return children;
   }
 
  private:
@@ -142,6 +165,10 @@ class ChildTest {
   struct Frame {
     __half2 step[3], near[3], far[3];
     std::uint32_t end;
+  };
+  // Of two children: 0xffff in the half of each that the ray meets, and where it enters them.
+  struct Met {
+    std::uint32_t mask, entry;
   };
   // Bytes of the planes where boxes are entered and left.
   struct Planes {
@@ -180,8 +207,7 @@ class ChildTest {
     return bits_of(__hfma2(reinterpret_cast<const __half2&>(bytes), step, base));
   }
 
-  // 0xffff in the half of each child of two that the ray meets.
-  __device__ OCTRACE_FORCE_INLINE static std::uint32_t meets(const Frame& f, const Planes& p) {
+  __device__ OCTRACE_FORCE_INLINE static Met meets(const Frame& f, const Planes& p) {
     const std::uint32_t entry = __vimax3_s16x2_relu(distance(p.near_x, f.step[0], f.near[0]),
                                                     distance(p.near_y, f.step[1], f.near[1]),
                                                     distance(p.near_z, f.step[2], f.near[2]));
@@ -189,8 +215,44 @@ class ChildTest {
                                                        distance(p.far_y, f.step[1], f.far[1]),
                                                        distance(p.far_z, f.step[2], f.far[2])),
                                         f.end);
-    return __hle2_mask(reinterpret_cast<const __half2&>(entry),
-                       reinterpret_cast<const __half2&>(exit));
+    return {__hle2_mask(reinterpret_cast<const __half2&>(entry),
+                        reinterpret_cast<const __half2&>(exit)),
+            entry};
+  }
+
+  // Bits 0 to 3 to the highest bits of four bytes; other bits of the result mean nothing.
+  __device__ OCTRACE_FORCE_INLINE static std::uint32_t sign_bits(std::uint32_t bits) {
+    return bits * 0x10204080u;
+  }
+  // The highest bits of two bytes to two halves of 0 or 0xffff.
+  template <unsigned kBytes>
+  __device__ OCTRACE_FORCE_INLINE static std::uint32_t spread_signs(std::uint32_t signs) {
+    std::uint32_t result;
+    asm("prmt.b32 %0, %1, 0, %2;" : "=r"(result) : "r"(signs), "n"(kBytes));
+    return result;
+  }
+
+  // Two children's entry distances with their slots in the low bits; 0xffff if the child is a leaf
+  // or not met. Distances that differ in those bits only go by slot.
+  __device__ OCTRACE_FORCE_INLINE static std::uint32_t key(const Met& met, std::uint32_t inner,
+                                                           std::uint32_t slots) {
+    return ((met.entry & 0xfff8fff8u) | slots) | ~(met.mask & inner);
+  }
+
+  struct Least {
+    std::uint32_t first, second;  // in the lower halves
+  };
+  __device__ OCTRACE_FORCE_INLINE static Least least_two(std::uint32_t a, std::uint32_t b,
+                                                         std::uint32_t c, std::uint32_t d) {
+    const std::uint32_t ab = __vminu2(a, b), cd = __vminu2(c, d);
+    const std::uint32_t first = __vminu2(ab, cd);
+    const std::uint32_t second = __vimin3_u16x2(__vmaxu2(ab, cd), __vmaxu2(a, b), __vmaxu2(c, d));
+    const std::uint32_t other = swap_halves(first);
+    return {__vminu2(first, other),
+            __vimin3_u16x2(__vmaxu2(first, other), second, swap_halves(second))};
+  }
+  __device__ OCTRACE_FORCE_INLINE static std::uint32_t swap_halves(std::uint32_t x) {
+    return __byte_perm(x, 0, 0x1032u);
   }
 
   // Of four children's bytes, the first and the third, or the second and the fourth, as halves.

@@ -43,7 +43,7 @@ struct RayBuffer {
   }
 };
 
-template <bool kAnyHit>
+template <bool kAnyHit, bool kOrder>
 __global__ void __launch_bounds__(kBlock, kBlocks<kAnyHit>)
     rays_kernel(const __grid_constant__ SceneView scene,
                 const __grid_constant__ RenderParams params, const RayBuffer rays, Report* report) {
@@ -51,8 +51,8 @@ __global__ void __launch_bounds__(kBlock, kBlocks<kAnyHit>)
   __shared__ WarpShared shared[kBlock / kWarp];
   block.fill();
   __syncthreads();
-  trace_rays<kAnyHit, kRefillBelow>(scene, params, rays, shared[threadIdx.x / kWarp], block,
-                                    report);
+  trace_rays<kAnyHit, kOrder, kRefillBelow>(scene, params, rays, shared[threadIdx.x / kWarp], block,
+                                            report);
 }
 
 // As many blocks as the device holds at once.
@@ -73,10 +73,10 @@ Status resident_blocks(Kernel kernel, unsigned* blocks) {
   return s;
 }
 
-template <bool kAnyHit>
+template <bool kAnyHit, bool kOrder>
 Status launch(const SceneView& scene, const RenderParams& params, const RayBuffer& rays,
               Report* report, cudaStream_t stream) {
-  const auto kernel = rays_kernel<kAnyHit>;
+  const auto kernel = rays_kernel<kAnyHit, kOrder>;
   unsigned blocks = 0;
   if (Status s = resident_blocks(kernel, &blocks); !s.ok()) return s;
   const std::uint64_t needed = (rays.size + kBlock - 1) / kBlock;
@@ -99,8 +99,9 @@ Status launch_rays(const OctreeView& octree, const RenderParams& params, const R
   geometry_only.alpha = 0;
   const RayBuffer buffer{rays, hits, count};
   const auto on = static_cast<cudaStream_t>(stream);
-  return any_hit ? launch<true>(scene, geometry_only, buffer, report, on)
-                 : launch<false>(scene, geometry_only, buffer, report, on);
+  if (any_hit) return launch<true, false>(scene, geometry_only, buffer, report, on);
+  return octree.cut ? launch<false, true>(scene, geometry_only, buffer, report, on)
+                    : launch<false, false>(scene, geometry_only, buffer, report, on);
 }
 
 Status time_rays(const OctreeView& octree, const RenderParams& params, const Ray* rays, Hit* hits,

@@ -222,9 +222,22 @@ __device__ OCTRACE_FORCE_INLINE std::uint64_t take_rays(unsigned idle, unsigned 
   return first + rank(idle, lane);
 }
 
+// Between the children to visit and inner_mask, a group has the upper half of a float: a distance
+// before any of its children but the nearest is entered.
+inline constexpr std::uint32_t kBoundBits = 0x00ffff00u;
+
+__device__ OCTRACE_FORCE_INLINE float bound_of(const WalkGroup& group) {
+  return __uint_as_float(group.pending << 8 & 0xffff0000u);
+}
+
+// kOrder: a node's children are visited by the ray's octant, but for the one that the ray enters
+// first, which comes first; and the others are passed over without a visit once the hit is nearer
+// than all of them. That takes 30 more instructions a node. It pays where siblings do not overlap
+// (OctreeView::cut): half of the nodes in sponza; in other trees it saves a tenth.
+//
 // Source: count(); load(index) -> Ray; prefetch(index), a hint before that index is loaded;
-// store(index, Hit) once for each.
-template <bool kAnyHit, int kRefill, class Source>
+// store(index, Hit) once for each; kAlpha, whether alpha masks count.
+template <bool kAnyHit, bool kOrder, int kRefill, class Source>
 __device__ OCTRACE_FORCE_INLINE void trace_rays(const SceneView& scene, const RenderParams& params,
                                                 const Source& source, WarpShared& shared,
                                                 const BlockShared& block, Report* report) {
@@ -239,6 +252,7 @@ __device__ OCTRACE_FORCE_INLINE void trace_rays(const SceneView& scene, const Re
   float tmax = 0.0f;
   WalkStack stack;
   WalkGroup group{0, 0};
+  int next = 0;  // kOrder: the bit of the group's child that comes next
   int depth = 0;
   std::uint32_t budget = 0;
   bool live = false, holds = false, more = true;
@@ -289,6 +303,7 @@ __device__ OCTRACE_FORCE_INLINE void trace_rays(const SceneView& scene, const Re
         tmax = from.tmax;
         // The root, as the child in slot 0 of nothing.
         group = {0, (1u << (24 + (octant ^ 7u))) | 1u};
+        next = highest_bit(group.pending);
         depth = 0;
         budget = static_cast<std::uint32_t>(scene.octree.nodes.size) + 1;
         holds = true;
@@ -302,11 +317,11 @@ __device__ OCTRACE_FORCE_INLINE void trace_rays(const SceneView& scene, const Re
     while (__popc(living) >= refill) {
       uint4 found = make_uint4(0, 0, 0, lane);
       if (live) {
-        const int bit = highest_bit(group.pending);
+        const int bit = kOrder ? next : highest_bit(group.pending);
         const std::uint32_t slot = (static_cast<std::uint32_t>(bit) ^ octant ^ 7u) & 7u;
         const std::uint32_t before = group.pending & 0xffu & ((1u << slot) - 1u);
-        const ChildMask children =
-            ChildTest::test(scene.octree.nodes[group.first_child + count_bits(before)], ray, tmax);
+        const ChildMask children = ChildTest::test<kOrder>(
+            scene.octree.nodes[group.first_child + count_bits(before)], ray, tmax);
         group.pending &= ~(1u << bit);
         const std::uint32_t inner = children.hit & children.inner_mask;
         if (inner != 0) {
@@ -320,6 +335,19 @@ __device__ OCTRACE_FORCE_INLINE void trace_rays(const SceneView& scene, const Re
           std::uint32_t ordered;
           asm volatile("ld.shared.u8 %0, [%1];" : "=r"(ordered) : "r"(order_at + inner));
           group = {children.first_child, ordered << 24 | children.inner_mask};
+          if constexpr (kOrder) {
+            group.pending |= __float_as_uint(children.others) >> 8 & kBoundBits;
+            next = static_cast<int>(24u + (children.nearest ^ octant ^ 7u));
+          }
+        } else if constexpr (kOrder) {
+          while (!(group.pending & kInnerBits) || bound_of(group) > tmax) {
+            if (depth == 0) {
+              live = false;
+              break;
+            }
+            group = stack[--depth];
+          }
+          next = highest_bit(group.pending);
         } else if (!(group.pending & kInnerBits)) {
           if (depth == 0) {
             live = false;

@@ -21,7 +21,7 @@ class CudaRays final : public RayGpu {
         .then([&] { return report_.reserve(sizeof(cuda::Report)); })
         .then([&] { return cuda::synchronize(nullptr); });
     if (!calls.ok()) return calls.error();
-    view_ = {span_of(nodes_, octree.nodes), span_of(triangles_, octree.triangles)};
+    view_ = {span_of(nodes_, octree.nodes), span_of(triangles_, octree.triangles), octree.cut};
     params_.cull = 0;
     params_.alpha = 0;
     return {};

@@ -51,7 +51,9 @@ class GpuRays {
         {static_cast<const kernels::LeafTriangle*>(triangles_.data()), octree.triangles.size()}};
   }
 
-  std::vector<Hit> trace(const std::vector<Ray>& rays, bool any_hit) {
+  // cut: which of the two walks, whatever the tree.
+  std::vector<Hit> trace(const std::vector<Ray>& rays, bool any_hit, bool cut = false) {
+    view_.cut = cut;
     std::vector<Hit> hits(rays.size());
     cuda::Report report{};
     check(cuda::clear(report_.data(), sizeof report, nullptr));
@@ -89,11 +91,13 @@ TEST_P(GpuRaysTest, HitWhatTheCpuHits) {
        ++batch) {
     const std::vector<Ray> rays = make_rays(mesh, octree, batch);
     const std::vector<Hit> closest = gpu.trace(rays, false), any = gpu.trace(rays, true);
+    const std::vector<Hit> ordered = gpu.trace(rays, false, true);
     tbb::parallel_for(std::size_t{0}, rays.size(), [&](std::size_t i) {
       Hit hit;
       tracer.closest(view, {}, rays[i], &hit);
       hit_count += hit.valid();
-      differing += std::memcmp(&hit, &closest[i], sizeof hit) != 0 || hit.valid() != any[i].valid();
+      differing += std::memcmp(&hit, &closest[i], sizeof hit) != 0 ||
+                   std::memcmp(&hit, &ordered[i], sizeof hit) != 0 || hit.valid() != any[i].valid();
     });
   }
   EXPECT_EQ(0u, differing) << mesh.name;

@@ -170,6 +170,7 @@ TEST(Octree, ListsTrianglesInSeveralLeavesExceptBlendOnes) {
       const util::Result<octree::Octree> octree = octree::build(input, options);
       ASSERT_TRUE(octree);
       EXPECT_TRUE(octree::verify(*octree, input));
+      EXPECT_EQ(octree->triangles.size() > mesh.triangles.size() * 1.01, octree->cut);
       if (flags == 0) {
         if (builder == Builder::quality) {
           EXPECT_GT(octree->triangles.size(), mesh.triangles.size());
