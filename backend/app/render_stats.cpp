@@ -50,6 +50,7 @@ util::Result<void> write_stats(const std::string& path, const RenderStats& stats
                 {"total", stats.total.milliseconds()}};
   json["octree"] = octree_json(octree::statistics(session.octree));
   json["octree"]["builder"] = octree::name_of(stats.builder);
+  json["octree"]["walk_bytes"] = stats.trace.walk_bytes;
   json["peak_rss_bytes"] = util::peak_resident_bytes();
   return util::write_file(path, json.dump(2) + "\n");
 }

@@ -227,6 +227,7 @@ util::Result<TraceStats> CpuRenderer::render(const kernels::RayCamera& camera,
     case TileOutcome::done:
       break;
   }
+  stats.walk_bytes = wide_.bytes();
   const unsigned threads = effective_threads(settings.threads);
   stats.device = fmt::format("cpu: {}, {} {}, {}", cpu_model(), threads,
                              threads == 1 ? "thread" : "threads", tracer_.instruction_set());

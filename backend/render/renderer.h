@@ -34,8 +34,9 @@ struct TraceStats {
   double seconds = 0.0;
   // On a GPU, by its own clock; copies overlap kernels, so the two may add up to more than seconds.
   double kernel_seconds = 0.0, download_seconds = 0.0;
-  double upload_seconds = 0.0;  // of the scene to the device, once a scene; 0 on the CPU
-  std::string device;           // "cpu: AMD EPYC 9654, 2 threads, AVX2"
+  double upload_seconds = 0.0;   // of the scene to the device, once a scene; 0 on the CPU
+  std::uint64_t walk_bytes = 0;  // of nodes made from the octree for the CPU; 0 on a GPU
+  std::string device;            // "cpu: AMD EPYC 9654, 2 threads, AVX2"
 };
 
 class Renderer {

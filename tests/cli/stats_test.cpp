@@ -50,6 +50,7 @@ TEST(Stats, SayWhatWasDone) {
   EXPECT_GT(found["octree"]["nodes"], 10);
   EXPECT_GT(found["octree"]["depth"], 1);
   EXPECT_GT(found["octree"]["bytes"], 1692 * 48);
+  EXPECT_GT(found["octree"]["walk_bytes"], 0);
   EXPECT_GT(found["peak_rss_bytes"], 1 << 20);
 }
 
