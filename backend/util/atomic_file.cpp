@@ -10,6 +10,7 @@
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
+#include <fstream>
 
 #include "backend/util/grouped_commit.h"
 #include "backend/util/interrupt.h"
@@ -38,10 +39,15 @@ bool write_all(int descriptor, std::string_view content) {
   return true;
 }
 
+// umask() cannot be asked without being set, and of two threads that set it and set it back one may
+// leave the other's 0 behind.
 mode_t process_umask() {
-  const mode_t mask = ::umask(0);
-  ::umask(mask);
-  return mask;
+  std::ifstream status("/proc/self/status");
+  for (std::string line; std::getline(status, line);) {
+    if (line.starts_with("Umask:"))
+      return static_cast<mode_t>(std::stoul(line.substr(6), nullptr, 8));
+  }
+  return 022;
 }
 
 }  // namespace
