@@ -48,7 +48,8 @@ class Planner {
     BinaryNode& node = nodes_[index];
     store(infinities(), costs.word);
     if (node.leaf() || depth == kMaxBinaryDepth) {
-      too_deep_ = too_deep_ || !node.leaf();
+      // Written only when it changes: a store at every leaf took its cache line from the others.
+      if (!node.leaf()) too_deep_ = true;
       store(eight(node.half_area() * kTriangleCost), costs.word + 8);
       costs.references = 1;
       node.plan = kLeafPlan;
