@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <memory>
 
 #include "backend/octree/box.h"
 
@@ -38,12 +39,30 @@ float below(double value) {
 
 float above(double value) { return -below(-value); }
 
+// As std::ldexp(1.0, exponent), which is a call.
+double power_of_two(std::int8_t exponent) {
+  return std::bit_cast<double>(static_cast<std::uint64_t>(1023 + exponent) << 52);
+}
+
+// A leaf slot's triangles, from its meta byte: a bit for each from bit 5 on.
+unsigned triangles_of(std::uint8_t meta) {
+  return (meta >> 5 & 1u) + (meta >> 6 & 1u) + (meta >> 7);
+}
+
+// Stable, and without std::stable_sort's memory.
+template <class T, class Less>
+void sort_few(T* first, T* last, const Less& less) {
+  for (T* i = first; i != last; ++i) {
+    std::rotate(std::upper_bound(first, i, *i, less), i, i + 1);
+  }
+}
+
 // A child's box as it was quantised. Exact: eight bits above the origin, or rounded to the nearest
 // float, which is what the walk of the compressed nodes does.
 Box quantised_box(const Node& node, int slot) {
   Box box;
   for (int axis = 0; axis < 3; ++axis) {
-    const double scale = std::ldexp(1.0, node.exponent[axis]);
+    const double scale = power_of_two(node.exponent[axis]);
     const double lower = node.origin[axis] + node.lower[axis][slot] * scale;
     const double upper = node.origin[axis] + node.upper[axis][slot] * scale;
     box.lower[axis] = below(lower);
@@ -78,7 +97,9 @@ class Widener {
     nothing_ = kernels::kLeafRef | static_cast<std::uint32_t>(used);
     to_.units = util::HugeArray<WideUnit>(used + kSpareUnits);
     std::uint32_t next = kNodeUnits;
-    const Box box = write(0, 0, next, 0.0f);
+    Children children;
+    gather(from_.nodes[0], children);
+    const Box box = write(0, children, 0, next, 0.0f);
     to_.lower = {box.lower[0], box.lower[1], box.lower[2]};
     to_.upper = {box.upper[0], box.upper[1], box.upper[2]};
   }
@@ -105,7 +126,7 @@ class Widener {
           height[i] = std::max<std::uint8_t>(height[i], height[child] + 1);
           ++child;
         } else if (node.meta[slot] != 0) {
-          const auto in_leaf = static_cast<unsigned>(std::popcount(node.meta[slot] >> 5 & 7u));
+          const auto in_leaf = triangles_of(node.meta[slot]);
           if (node.first_triangle + std::uint64_t{node.meta[slot] & 31u} + in_leaf >
               from_.triangles.size)
             return false;
@@ -152,7 +173,7 @@ class Widener {
   // Adds the triangles of a leaf slot, or of all leaf slots of a small subtree.
   void collect(const Node& node, int slot, Leaf& leaf) const {
     const std::uint32_t first = node.first_triangle + (node.meta[slot] & 31u);
-    const auto count = static_cast<unsigned>(std::popcount(node.meta[slot] >> 5 & 7u));
+    const auto count = triangles_of(node.meta[slot]);
     Box box;
     for (std::uint32_t i = 0; i < count; ++i) {
       leaf.triangles[leaf.count++] = first + i;
@@ -176,6 +197,8 @@ class Widener {
   // A leaf costs its surface times one test of up to eight triangles: two are merged where the
   // surface of both is less than the sum.
   static std::size_t merge(std::array<Leaf, kChildren>& leaves, std::size_t count) {
+    std::array<float, kChildren> areas;
+    for (std::size_t i = 0; i < count; ++i) areas[i] = leaves[i].box.half_area();
     for (bool merged = true; merged;) {
       merged = false;
       float best = 0.0f;
@@ -185,8 +208,7 @@ class Widener {
           if (leaves[a].count + leaves[b].count > kWideLanes) continue;
           Box both = leaves[a].box;
           both.add(leaves[b].box);
-          const float gain =
-              leaves[a].box.half_area() + leaves[b].box.half_area() - both.half_area();
+          const float gain = areas[a] + areas[b] - both.half_area();
           if (gain > best) {
             best = gain;
             best_a = a;
@@ -201,7 +223,9 @@ class Widener {
       a.box.add(b.box);
       std::copy_n(b.triangles.begin(), b.count, a.triangles.begin() + a.count);
       a.count += b.count;
+      areas[best_a] = a.box.half_area();
       b = leaves[--count];
+      areas[best_b] = areas[count];
     }
     return count;
   }
@@ -261,15 +285,16 @@ class Widener {
       for (int slot = 0; slot < kChildren; ++slot) {
         if (node.meta[slot] != 0) most = std::max<int>(most, node.upper[axis][slot]);
       }
-      extent = std::max(extent, std::ldexp(static_cast<float>(most), node.exponent[axis]));
+      extent = std::max(extent, static_cast<float>(most * power_of_two(node.exponent[axis])));
     }
     return extent;
   }
 
+  struct Children;
   struct Inner {
     std::uint32_t index = 0, unit = 0;
     Box box;
-    int children = 0;  // 0: not counted yet
+    std::unique_ptr<Children> below;  // once gathered: by who might open it, for who writes it
   };
 
   struct Children {
@@ -288,7 +313,7 @@ class Widener {
           collect_all(from_.nodes[child], leaf);
           narrow(leaf.box, quantised_box(node, slot));
         } else {
-          to.inner[to.inner_count++] = {child, 0, quantised_box(node, slot), 0};
+          to.inner[to.inner_count++] = {child, 0, quantised_box(node, slot), nullptr};
         }
         ++child;
       } else if (node.meta[slot] != 0) {
@@ -304,43 +329,44 @@ class Widener {
   void open(Children& children) const {
     while (true) {
       std::size_t best = kChildren;
-      Children below;
       for (std::size_t i = 0; i < children.inner_count; ++i) {
         Inner& inner = children.inner[i];
         if (best != kChildren && inner.box.half_area() <= children.inner[best].box.half_area())
           continue;
-        if (inner.children == 0) {
-          Children found;
-          gather(from_.nodes[inner.index], found);
-          inner.children = static_cast<int>(found.size());
-        }
-        if (children.size() - 1 + static_cast<std::size_t>(inner.children) <= kChildren) best = i;
+        if (children.size() - 1 + gathered(inner).size() <= kChildren) best = i;
       }
       if (best == kChildren) return;
-      gather(from_.nodes[children.inner[best].index], below);
+      const std::unique_ptr<Children> below = std::move(children.inner[best].below);
       const Box bounds = children.inner[best].box;
-      children.inner[best] = children.inner[--children.inner_count];
-      for (std::size_t i = 0; i < below.inner_count; ++i) {
-        narrow(below.inner[i].box, bounds);
-        children.inner[children.inner_count++] = below.inner[i];
+      children.inner[best] = std::move(children.inner[--children.inner_count]);
+      for (std::size_t i = 0; i < below->inner_count; ++i) {
+        narrow(below->inner[i].box, bounds);
+        children.inner[children.inner_count++] = std::move(below->inner[i]);
       }
-      for (std::size_t i = 0; i < below.leaf_count; ++i) {
-        narrow(below.leaves[i].box, bounds);
-        children.leaves[children.leaf_count++] = below.leaves[i];
+      for (std::size_t i = 0; i < below->leaf_count; ++i) {
+        narrow(below->leaves[i].box, bounds);
+        children.leaves[children.leaf_count++] = below->leaves[i];
       }
       children.leaf_count = merge(children.leaves, children.leaf_count);
     }
   }
 
-  // Writes the subtree of the octree's node `index` to unit `unit`, and what is below from `next`
-  // on, which is moved behind it. Returns its box.
-  Box write(std::uint32_t index, std::uint32_t unit, std::uint32_t& next, float least_extent) {
+  Children& gathered(Inner& inner) const {
+    if (inner.below == nullptr) {
+      inner.below = std::make_unique<Children>();
+      gather(from_.nodes[inner.index], *inner.below);
+    }
+    return *inner.below;
+  }
+
+  // Writes the subtree of the octree's node `index` with the children gathered from it to unit
+  // `unit`, and what is below from `next` on, which is moved behind it. Returns its box.
+  Box write(std::uint32_t index, Children& children, std::uint32_t unit, std::uint32_t& next,
+            float least_extent) {
     const Node& node = from_.nodes[index];
     WideNode& wide = reinterpret_cast<WideNode&>(to_.units[unit]);
     const float extent = std::max(least_extent, frame_extent(node));
-    const double padding = std::ldexp(double{extent}, -19);
-    Children children;
-    gather(node, children);
+    const double padding = double{extent} * 0x1p-19;
     open(children);
 
     // Where their order is left open, and among boxes that hold the ray's origin, the last slot
@@ -351,9 +377,8 @@ class Widener {
       return a.box.half_area() < b.box.half_area();
     };
     const auto larger = [&](const auto& a, const auto& b) { return smaller(b, a); };
-    std::stable_sort(children.inner.begin(), children.inner.begin() + children.inner_count, larger);
-    std::stable_sort(children.leaves.begin(), children.leaves.begin() + children.leaf_count,
-                     smaller);
+    sort_few(children.inner.data(), children.inner.data() + children.inner_count, larger);
+    sort_few(children.leaves.data(), children.leaves.data() + children.leaf_count, smaller);
     Box bounds;
     auto slot = static_cast<int>(children.inner_count);
     for (std::size_t i = 0; i < children.leaf_count; ++i, ++slot) {
@@ -364,7 +389,8 @@ class Widener {
     }
     const auto run = [&](std::size_t i, std::uint32_t& place) {
       Inner& inner = children.inner[i];
-      const Box box = write(inner.index, inner.unit, place, std::ldexp(extent, -10));
+      const Box box = write(inner.index, gathered(inner), inner.unit, place, extent * 0x1p-10f);
+      inner.below.reset();
       narrow(inner.box, box);
       set_child(wide, static_cast<int>(i), inner.box, padding, inner.unit);
     };

@@ -148,8 +148,8 @@ TEST_P(OctreeTargets, MakeTheSameOctree) {
 
 INSTANTIATE_TEST_SUITE_P(Meshes, OctreeTargets,
                          testing::Range<std::size_t>(0, hard_meshes().size()),
-                         [](const auto& info) {
-                           std::string name = hard_meshes()[info.param].name;
+                         [](const auto& about) {
+                           std::string name = hard_meshes()[about.param].name;
                            std::replace(name.begin(), name.end(), ' ', '_');
                            return name;
                          });
