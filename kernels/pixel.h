@@ -75,8 +75,23 @@ OCTRACE_HD inline void store_hit(const Scene& scene, const Ray& ray, const HitOf
   }
 }
 
-// All planes but beauty, of the pixel's centre. Surfaces with alpha mode BLEND count as solid,
-// because a pixel has one depth. `motion`: NoMotion or MotionPlane.
+// All planes but beauty, from what the ray through the pixel's centre found. `motion`: NoMotion or
+// MotionPlane.
+template <class Scene, class Motion = NoMotion>
+OCTRACE_HD inline void store_geometry(const Scene& scene, const Ray& ray, const HitOf<Scene>& hit,
+                                      const FramebufferView& to, std::uint32_t x, std::uint32_t y,
+                                      const Motion& motion = {}) {
+  const std::uint64_t pixel = to.pixel(x, y);
+  if (hit.valid()) {
+    store_hit(scene, ray, hit, to, pixel);
+  } else {
+    store_background(to, pixel);
+  }
+  motion(scene, hit, to, pixel);
+}
+
+// The same, tracing the ray. Surfaces with alpha mode BLEND count as solid, because a pixel has one
+// depth.
 template <class Scene, class Tracer, class Motion = NoMotion>
 OCTRACE_HD TraceStatus trace_geometry(const Scene& scene, const RayCamera& camera,
                                       const RenderParams& params, const FramebufferView& to,
@@ -85,15 +100,8 @@ OCTRACE_HD TraceStatus trace_geometry(const Scene& scene, const RayCamera& camer
   const Ray ray = camera_ray(camera, static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f);
   HitOf<Scene> hit;
   const TraceStatus status = tracer.closest(scene, params, ray, &hit);
-  if (status != TraceStatus::ok) return status;
-  const std::uint64_t pixel = to.pixel(x, y);
-  if (hit.valid()) {
-    store_hit(scene, ray, hit, to, pixel);
-  } else {
-    store_background(to, pixel);
-  }
-  motion(scene, hit, to, pixel);
-  return TraceStatus::ok;
+  if (status == TraceStatus::ok) store_geometry(scene, ray, hit, to, x, y, motion);
+  return status;
 }
 
 // A box filter of one pixel's width over params.spp stratified positions; one sample goes through

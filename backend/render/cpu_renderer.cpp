@@ -52,16 +52,6 @@ struct TileCounts {
   kernels::RayCounts beauty;
 };
 
-// What a packet of rays found, in the place of a tracer.
-struct Found {
-  kernels::Hit hit;
-  TraceStatus closest(const kernels::SceneView&, const kernels::RenderParams&, const kernels::Ray&,
-                      kernels::Hit* to) const {
-    *to = hit;
-    return TraceStatus::ok;
-  }
-};
-
 template <class Scene, class Tracer>
 TraceStatus geometry_pixel(const View& view, const Scene& scene, const Tracer& tracer,
                            std::uint32_t x, std::uint32_t y) {
@@ -108,7 +98,14 @@ TileFailure trace_geometry_tile(const View& view, const kernels::SceneView& scen
   }
   std::size_t next = 0;
   return visit_pixels(tile, [&](std::uint32_t x, std::uint32_t y) {
-    return geometry_pixel(view, scene, Found{hits[next++]}, x, y);
+    const std::size_t i = next++;
+    if (view.motion == nullptr) {
+      store_geometry(scene, rays[i], hits[i], view.target, x, y);
+    } else {
+      store_geometry(scene, rays[i], hits[i], view.target, x, y,
+                     kernels::MotionPlane{*view.motion});
+    }
+    return TraceStatus::ok;
   });
 }
 
