@@ -73,6 +73,7 @@ OCTRACE_HD OCTRACE_FORCE_INLINE bool dim(const SceneView& scene, const RenderPar
 }
 
 OCTRACE_HD OCTRACE_FORCE_INLINE float transmittance_of(std::uint32_t opacity) {
+  if (opacity == 0) return 1.0f;  // most often
   return opacity >= kOpacityBlocked ? 0.0f : exp2f(-static_cast<float>(opacity) / kOpacityOne);
 }
 

@@ -8,6 +8,7 @@
 #undef OCTRACE_WIDE
 #if HWY_MAX_BYTES >= 32 && HWY_TARGET != HWY_SCALAR && HWY_TARGET != HWY_EMU128
 #define OCTRACE_WIDE 1
+#include "kernels/cpu/group-inl.h"
 #include "kernels/cpu/packet-inl.h"
 #include "kernels/cpu/stream-inl.h"
 #else
@@ -169,14 +170,37 @@ HWY_ATTR TraceStatus instanced_transmittance(const InstancedSceneView& scene,
   return shadow_transmittance(scene, params, ray, SimdChildTest{}, transmittance);
 }
 
+#if OCTRACE_WIDE
+// How many rays to trace on their own, where tracing them in groups has failed, before it is tried
+// again.
+inline constexpr std::uint32_t kStreamed = 4096;
+
+// Calls store(index, ray) for each of rays[0, count).
+template <class Query, class Store>
+HWY_ATTR HWY_INLINE void trace_many(const WideView& tree, const SceneView& scene,
+                                    const RenderParams& params, const Ray* rays,
+                                    std::uint32_t count, const Store& store) {
+  RayGroup groups[kGroups];
+  for (std::uint32_t first = 0; first < count;) {
+    const auto put = [&](std::uint32_t i, const RayState& ray) HWY_ATTR { store(first + i, ray); };
+    const std::uint32_t grouped =
+        trace_groups<Query>(tree, scene, params, rays + first, count - first, groups, put);
+    first += grouped;
+    const std::uint32_t streamed = count - first < kStreamed ? count - first : kStreamed;
+    trace_stream<Query>(tree, scene, params, rays + first, streamed, put);
+    first += streamed;
+  }
+}
+#endif
+
 HWY_ATTR TraceStatus closest_stream(const WideView& tree, const SceneView& scene,
                                     const RenderParams& params, const Ray* rays,
                                     std::uint32_t count, Hit* hits) {
 #if OCTRACE_WIDE
   if (!tree.empty()) {
-    trace_stream<ClosestQuery>(tree, scene, params, rays, count,
-                               [&](std::uint32_t i, const WideRay& walk)
-                                   HWY_ATTR { hits[i] = walk.hit; });
+    trace_many<ClosestQuery>(tree, scene, params, rays, count,
+                             [&](std::uint32_t i, const RayState& state)
+                                 HWY_ATTR { hits[i] = state.hit; });
     return TraceStatus::ok;
   }
 #endif
@@ -195,7 +219,7 @@ HWY_ATTR TraceStatus closest_packets(const WideView& tree, const SceneView& scen
 #if OCTRACE_WIDE
   if (!tree.empty()) {
     Packet packet;
-    // Where packets fail, more and more rays go into streams before the next one is tried.
+    // Where packets fail, more and more rays go into groups before the next one is tried.
     std::uint32_t streamed = kPacketRays;
     for (std::uint32_t first = 0, size; first < count; first += size) {
       size = count - first < kPacketRays ? count - first : kPacketRays;
@@ -218,10 +242,10 @@ HWY_ATTR TraceStatus transmittance_stream(const WideView& tree, const SceneView&
                                           std::uint32_t count, float* transmittances) {
 #if OCTRACE_WIDE
   if (!tree.empty()) {
-    trace_stream<TransmittanceQuery>(tree, scene, params, rays, count,
-                                     [&](std::uint32_t i, const WideRay& walk) HWY_ATTR {
-                                       transmittances[i] = transmittance_of(walk.opacity);
-                                     });
+    trace_many<TransmittanceQuery>(tree, scene, params, rays, count,
+                                   [&](std::uint32_t i, const RayState& state) HWY_ATTR {
+                                     transmittances[i] = transmittance_of(state.opacity);
+                                   });
     return TraceStatus::ok;
   }
 #endif

@@ -24,7 +24,8 @@ class CpuTracer {
                             float* transmittance) const {
     return transmittance_(wide_, scene, params, ray, transmittance);
   }
-  // The same for many rays that need not lie together: faster than one by one.
+  // The same for many rays: faster than one by one, most of all where those near each other in the
+  // array start close together, whatever their directions.
   TraceStatus closest(const SceneView& scene, const RenderParams& params, const Ray* rays,
                       std::uint32_t count, Hit* hits) const {
     return closest_stream_(wide_, scene, params, rays, count, hits);

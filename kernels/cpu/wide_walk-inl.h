@@ -31,12 +31,18 @@ HWY_ATTR HWY_INLINE std::uint32_t bits_of(hn::Mask<Floats> mask) {
   return bits[0];
 }
 
-struct alignas(64) WideRay {
+// What a ray has found.
+struct RayState {
+  Hit hit;
+  float tmax;
+  std::uint32_t opacity;
+};
+
+struct alignas(64) WideRay : RayState {
   // A plane p of an axis is met at p * inverse + base - t * spread where a box is entered, at
   // p * inverse + base + t * spread where it is left: three lanes for each, the fourth is unused.
-  float base[8], spread[8];
+  alignas(32) float base[8], spread[8];
   Vec3 inverse;
-  float tmax;
   std::uint32_t enter[3];  // where a node keeps the planes that are entered, in bytes
   // What comes next, and where along the ray it begins.
   WideRef ref;
@@ -46,13 +52,11 @@ struct alignas(64) WideRay {
   // For leaves.
   Vec3 direction;
   float largest;      // component of the direction
-  float edge, plane;  // how far the quick test may be wrong: see visit_leaf()
+  float edge, plane;  // how far the quick test may be wrong: see candidates()
   float ahead;
   float tmin;
   SlabRay slab;
   TriangleRay shear;
-  Hit hit;
-  std::uint32_t opacity;
   std::uint32_t index;
   alignas(64) float stack_t[kWideStack];
   alignas(64) WideRef stack_ref[kWideStack];
@@ -204,7 +208,7 @@ HWY_ATTR HWY_INLINE void drop_far(WideRay& ray) {
 struct ClosestQuery {
   static constexpr bool kNearest = true;
   static HWY_ATTR HWY_INLINE bool take(const SceneView& scene, const RenderParams& params,
-                                       WideRay& ray, const TriangleHit& found,
+                                       RayState& ray, const TriangleHit& found,
                                        std::uint32_t triangle, std::uint32_t flags) {
     if (ray.hit.valid() && found.t == ray.hit.t && triangle > ray.hit.triangle) return false;
     if ((flags & kAlphaTest) != 0 && params.alpha != 0 &&
@@ -223,7 +227,7 @@ struct ClosestQuery {
 struct TransmittanceQuery {
   static constexpr bool kNearest = false;
   static HWY_ATTR HWY_INLINE bool take(const SceneView& scene, const RenderParams& params,
-                                       WideRay& ray, const TriangleHit& found,
+                                       RayState& ray, const TriangleHit& found,
                                        std::uint32_t triangle, std::uint32_t flags) {
     const bool alpha = params.alpha != 0 && (flags & (kAlphaTest | kBlend)) != 0;
     const std::uint32_t geometry = alpha ? scene.triangle_geometry[triangle] : 0;
@@ -232,12 +236,24 @@ struct TransmittanceQuery {
   static bool culls(const RenderParams&, std::uint32_t) { return false; }
 };
 
-// Which triangles of the leaf that comes next the ray may hit: a test by signed volumes, a triangle
-// a lane (after Moeller and Trumbore 1997).
+HWY_ATTR HWY_INLINE void cross(const hn::Vec<Floats>* a, const hn::Vec<Floats>* b,
+                               hn::Vec<Floats>* out) {
+  for (int x = 0; x < 3; ++x) {
+    const int y = (x + 1) % 3, z = (x + 2) % 3;
+    out[x] = hn::MulSub(a[y], b[z], hn::Mul(a[z], b[y]));
+  }
+}
+
+HWY_ATTR HWY_INLINE hn::Vec<Floats> dot(const hn::Vec<Floats>* a, const hn::Vec<Floats>* b) {
+  return hn::MulAdd(a[0], b[0], hn::MulAdd(a[1], b[1], hn::Mul(a[2], b[2])));
+}
+
+// Which triangles of a leaf a ray may hit: a test by signed volumes, a triangle a lane (after
+// Moeller and Trumbore 1997).
 //
-// It never drops a triangle that intersect_triangle() hits. Let M bound the distance
-// along an axis from the ray's origin to the triangle's corners, S its longest side, D the largest
-// component of the direction. intersect_triangle() decides by corners that are within 2^-21 M of
+// It never drops a triangle that intersect_triangle() hits. Let M bound the distance along an axis
+// from the ray's origin to the triangle's corners, S its longest side, D the largest component of
+// the direction. intersect_triangle() decides by corners that are within 2^-21 M of
 // the true ones, across the ray, so a triangle that it hits has edge functions that miss having one
 // sign by at most 12 * 2^-21 M S: 12 * 2^-21 M S D in the volumes here, whose own roundings are
 // below 2^-17 M S D. `edge` allows 2^-16 M S D. It computes t from weights that are off by 2^-11
@@ -245,53 +261,81 @@ struct TransmittanceQuery {
 // plane (`ahead`) and, all roundings counted, 2^-15 M S^2 in units of the normal (`plane`).
 // Numbers that are not lets a triangle pass. S and M come from the leaf's row of reaches W: S <= W,
 // M <= t D + W, where the ray enters the leaf's box at t.
+struct LeafLanes {
+  hn::Vec<Floats> a[3], to_b[3], to_c[3], normal[3];  // to_b is a - b, to_c is c - a
+  hn::Vec<Floats> reach;
+};
+
+HWY_ATTR HWY_INLINE LeafLanes load_leaf(const float* rows, std::uint32_t n) {
+  const Floats d;
+  const auto row = [&](std::uint32_t r) HWY_ATTR { return hn::LoadU(d, rows + r * n); };
+  LeafLanes leaf;
+  for (std::uint32_t axis = 0; axis < 3; ++axis) {
+    leaf.a[axis] = row(axis);
+    leaf.to_b[axis] = hn::Sub(leaf.a[axis], row(3 + axis));
+    leaf.to_c[axis] = hn::Sub(row(6 + axis), leaf.a[axis]);
+  }
+  cross(leaf.to_c, leaf.to_b, leaf.normal);
+  leaf.reach = row(kRowReach);
+  return leaf;
+}
+
+// How far the test may be wrong.
+struct LeafMargins {
+  hn::Vec<Floats> edge, plane, ahead;
+};
+
+// `far`: M.
+HWY_ATTR HWY_INLINE LeafMargins leaf_margins(const LeafLanes& leaf, hn::Vec<Floats> far, float edge,
+                                             float plane, float ahead) {
+  const Floats d;
+  const auto area = hn::Mul(leaf.reach, far);
+  const auto tiny = hn::Set(d, 1e-37f);
+  return {hn::MulAdd(area, hn::Set(d, edge), tiny),
+          hn::MulAdd(hn::Mul(area, leaf.reach), hn::Set(d, plane), tiny),
+          hn::Mul(leaf.reach, hn::Set(d, ahead))};
+}
+
+// A bit for each triangle of the leaf.
+HWY_ATTR HWY_INLINE std::uint32_t candidates(const LeafLanes& leaf, const LeafMargins& margins,
+                                             const Vec3& origin, const Vec3& direction, float tmin,
+                                             float tmax) {
+  const Floats d;
+  using V = hn::Vec<Floats>;
+  V o[3], to[3], across[3];
+  for (int axis = 0; axis < 3; ++axis) {
+    o[axis] = hn::Sub(leaf.a[axis], hn::Set(d, origin[axis]));
+    to[axis] = hn::Set(d, direction[axis]);
+  }
+  cross(o, to, across);
+  const V volume = dot(leaf.normal, to), u = dot(across, leaf.to_c), v = dot(across, leaf.to_b);
+  const V w = hn::Sub(hn::Sub(volume, u), v);
+  const V sign = hn::And(volume, hn::Set(d, -0.0f));
+  const V distance = hn::Xor(dot(leaf.normal, o), sign);
+  const V size = hn::Xor(volume, sign);
+  const V first = hn::MulSub(size, hn::Sub(hn::Set(d, tmin), margins.ahead), margins.plane);
+  const V last = hn::MulAdd(size, hn::Add(hn::Set(d, tmax), margins.ahead), margins.plane);
+  const auto beside = hn::And(hn::Lt(hn::Min(hn::Min(u, v), w), hn::Neg(margins.edge)),
+                              hn::Gt(hn::Max(hn::Max(u, v), w), margins.edge));
+  const auto missed = hn::Or(beside, hn::Or(hn::Lt(distance, first), hn::Gt(distance, last)));
+  return ~bits_of(missed);
+}
+
 HWY_ATTR HWY_INLINE std::uint32_t candidates(const WideView& tree, const WideRay& ray) {
   const Floats d;
   const std::uint32_t n = leaf_count(ray.ref);
-  const float* rows = tree.leaf(ray.ref);
-  using V = hn::Vec<Floats>;
-  const auto row = [&](std::uint32_t r) HWY_ATTR { return hn::LoadU(d, rows + r * n); };
-  const V ax = row(0), ay = row(1), az = row(2);
-  const V bx = hn::Sub(ax, row(3)), by = hn::Sub(ay, row(4)), bz = hn::Sub(az, row(5));
-  const V cx = hn::Sub(row(6), ax), cy = hn::Sub(row(7), ay), cz = hn::Sub(row(8), az);
-  const V ox = hn::Sub(ax, hn::Set(d, ray.slab.origin.x));
-  const V oy = hn::Sub(ay, hn::Set(d, ray.slab.origin.y));
-  const V oz = hn::Sub(az, hn::Set(d, ray.slab.origin.z));
-  const V dx = hn::Set(d, ray.direction.x), dy = hn::Set(d, ray.direction.y);
-  const V dz = hn::Set(d, ray.direction.z);
-  const auto cross = [&](V a, V b, V c, V e) HWY_ATTR { return hn::MulSub(a, b, hn::Mul(c, e)); };
-  const auto dot = [&](V x, V y, V z, V u, V v, V w)
-                       HWY_ATTR { return hn::MulAdd(x, u, hn::MulAdd(y, v, hn::Mul(z, w))); };
-  const V rx = cross(oy, dz, oz, dy), ry = cross(oz, dx, ox, dz), rz = cross(ox, dy, oy, dx);
-  const V nx = cross(cy, bz, cz, by), ny = cross(cz, bx, cx, bz), nz = cross(cx, by, cy, bx);
-  const V volume = dot(nx, ny, nz, dx, dy, dz);
-  const V u = dot(rx, ry, rz, cx, cy, cz), v = dot(rx, ry, rz, bx, by, bz);
-  const V w = hn::Sub(hn::Sub(volume, u), v);
-  const V reach = row(kRowReach);
-  const V far = hn::MulAdd(hn::Set(d, ray.t), hn::Set(d, ray.largest), reach);
-  const V area = hn::Mul(reach, far);
-  const V tiny = hn::Set(d, 1e-37f);
-  const V edge = hn::MulAdd(area, hn::Set(d, ray.edge), tiny);
-  const V plane = hn::MulAdd(hn::Mul(area, reach), hn::Set(d, ray.plane), tiny);
-  const V sign = hn::And(volume, hn::Set(d, -0.0f));
-  const V distance = hn::Xor(dot(nx, ny, nz, ox, oy, oz), sign);
-  const V size = hn::Xor(volume, sign);
-  const V ahead = hn::Mul(reach, hn::Set(d, ray.ahead));
-  const V from = hn::MulSub(size, hn::Sub(hn::Set(d, ray.tmin), ahead), plane);
-  const V to = hn::MulAdd(size, hn::Add(hn::Set(d, ray.tmax), ahead), plane);
-  const auto beside = hn::And(hn::Lt(hn::Min(hn::Min(u, v), w), hn::Neg(edge)),
-                              hn::Gt(hn::Max(hn::Max(u, v), w), edge));
-  const auto missed = hn::Or(beside, hn::Or(hn::Lt(distance, from), hn::Gt(distance, to)));
-  return ~bits_of(missed) & ((1u << n) - 1u);
+  const LeafLanes leaf = load_leaf(tree.leaf(ray.ref), n);
+  const auto far = hn::MulAdd(hn::Set(d, ray.t), hn::Set(d, ray.largest), leaf.reach);
+  const LeafMargins margins = leaf_margins(leaf, far, ray.edge, ray.plane, ray.ahead);
+  return candidates(leaf, margins, ray.slab.origin, ray.direction, ray.tmin, ray.tmax) &
+         ((1u << n) - 1u);
 }
 
 // Tests the candidates with intersect_triangle(). True: the walk is over.
 template <class Query>
-HWY_ATTR HWY_INLINE bool test(const WideView& tree, const SceneView& scene,
-                              const RenderParams& params, WideRay& ray, std::uint32_t left) {
-  const std::uint32_t n = leaf_count(ray.ref);
-  const float* rows = tree.leaf(ray.ref);
-  const float tmax = ray.tmax;
+HWY_ATTR HWY_INLINE bool test(const SceneView& scene, const RenderParams& params, const float* rows,
+                              std::uint32_t n, std::uint32_t left, const SlabRay& slab,
+                              const TriangleRay& shear, float tmin, RayState& ray) {
   for (; left != 0; left &= left - 1) {
     const float* corners = rows + lowest_bit(left);
     const auto corner = [&](std::uint32_t r) {
@@ -304,11 +348,22 @@ HWY_ATTR HWY_INLINE bool test(const WideView& tree, const SceneView& scene,
     };
     const std::uint32_t flags = word(kRowFlags);
     TriangleHit found;
-    if (intersect_triangle(ray.slab, ray.shear, corner(0), corner(3), corner(6), ray.tmin, ray.tmax,
+    if (intersect_triangle(slab, shear, corner(0), corner(3), corner(6), tmin, ray.tmax,
                            Query::culls(params, flags), &found) &&
         Query::take(scene, params, ray, found, word(kRowTriangle), flags)) {
       return true;
     }
+  }
+  return false;
+}
+
+template <class Query>
+HWY_ATTR HWY_INLINE bool test(const WideView& tree, const SceneView& scene,
+                              const RenderParams& params, WideRay& ray, std::uint32_t left) {
+  const float tmax = ray.tmax;
+  if (test<Query>(scene, params, tree.leaf(ray.ref), leaf_count(ray.ref), left, ray.slab, ray.shear,
+                  ray.tmin, ray)) {
+    return true;
   }
   if (ray.tmax < tmax) drop_far(ray);
   return false;

@@ -94,6 +94,24 @@ struct Wide : testing::TestWithParam<std::size_t> {
     return rays;
   }
 
+  // Every hundred in a row start close together and go anywhere, as rays for ambient occlusion do.
+  std::vector<Ray> make_fans(const octree::Octree& octree, std::mt19937_64& random,
+                             std::size_t count) const {
+    std::uniform_real_distribution<float> unit(-1.0f, 1.0f);
+    std::vector<Ray> rays;
+    for (std::size_t i = 0; i < count; ++i) {
+      rays.push_back(random_ray(mesh, octree, random));
+      if (i % 100 == 0) continue;
+      Ray& ray = rays[i];
+      const kernels::Vec3 target = ray.origin + ray.direction;
+      for (int axis = 0; axis < 3; ++axis) {
+        ray.origin[axis] = rays[i - i % 100].origin[axis] * (1.0f + 1e-3f * unit(random));
+      }
+      ray.direction = target - ray.origin;
+    }
+    return rays;
+  }
+
   void check(const octree::Octree& octree, const std::vector<Ray>& rays) const {
     const octree::WideOctree wide = octree::make_wide(octree.view());
     ASSERT_FALSE(wide.view().empty());
@@ -143,6 +161,8 @@ TEST_P(Wide, HitsWhatBruteForceHits) {
                      << mesh.name << ", seed " << seed() << ", spread " << spread);
         check(octree, make_rays(octree, random, scaled(20'000) + 5, spread));
       }
+      SCOPED_TRACE(testing::Message() << mesh.name << ", seed " << seed() << ", fans");
+      check(octree, make_fans(octree, random, scaled(20'000) + 5));
     }
     hwy::SetSupportedTargetsForTest(0);
   }
