@@ -1,8 +1,10 @@
 // A folder of this process's own below $TMPDIR (/tmp without it), removed at the end with what is
-// in it.
+// in it. Each holds a locked file, so that what killed runs left there is told apart and removed
+// when the next folder is made.
 #pragma once
 
 #include <string>
+#include <utility>
 
 #include "backend/util/result.h"
 
@@ -18,8 +20,9 @@ class ScratchFolder {
   const std::string& path() const { return path_; }  // ends in '/'
 
  private:
-  explicit ScratchFolder(std::string path) : path_(std::move(path)) {}
+  ScratchFolder(std::string path, int lock) : path_(std::move(path)), lock_(lock) {}
   std::string path_;
+  int lock_;
 };
 
 // The file's content; the file is gone afterwards.

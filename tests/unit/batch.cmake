@@ -1,5 +1,5 @@
 octrace_test(batch_test
-  SOURCES batch_journal.cpp batch_paths.cpp
+  SOURCES batch_journal.cpp batch_paths.cpp batch_scratch.cpp
   LIBRARIES GTest::gmock octrace_batch
   LABELS unit)
 octrace_test(batch_files_test
