@@ -156,6 +156,7 @@ class CpuRenderer final : public Renderer {
   void look(bool moved) {
     scene_ = octree::instanced_view(source_, octree_);
     if (!moved) return;
+    wide_ = {};  // before the new ones are made
     // Only scenes without instances are walked by their wide nodes.
     wide_ = kernels::CpuTracer::uses_wide() && scene_.top.nodes.empty()
                 ? octree::make_wide(scene_.octree)

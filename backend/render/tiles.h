@@ -35,7 +35,7 @@ enum class TileOutcome { done, failed, cancelled };
 
 // One thread at a time. All jobs share an arena, so that many views leave none behind. It is not a
 // thread_local: registering its destructor would wait for the dynamic loader, which may be at work
-// on the image library for 200 ms (image::preload).
+// on the image library (image::preload).
 class TileRunner {
  public:
   TileOutcome run(const TileJob& job);

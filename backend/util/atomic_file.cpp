@@ -11,6 +11,7 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <mutex>
 
 #include "backend/util/grouped_commit.h"
 #include "backend/util/interrupt.h"
@@ -40,14 +41,19 @@ bool write_all(int descriptor, std::string_view content) {
 }
 
 // umask() cannot be asked without being set, and of two threads that set it and set it back one may
-// leave the other's 0 behind.
+// leave the other's 0 behind. Only where /proc does not say it (Linux before 4.7) it is set, by one
+// thread at a time.
 mode_t process_umask() {
   std::ifstream status("/proc/self/status");
   for (std::string line; std::getline(status, line);) {
     if (line.starts_with("Umask:"))
       return static_cast<mode_t>(std::stoul(line.substr(6), nullptr, 8));
   }
-  return 022;
+  static std::mutex mutex;
+  const std::lock_guard lock(mutex);
+  const mode_t mask = ::umask(0);
+  ::umask(mask);
+  return mask;
 }
 
 }  // namespace

@@ -146,8 +146,10 @@ class ChildTest {
                                     key(d, spread_signs<0xbb99>(inner_high), 0x00070005u));
       children.nearest = least.first & 7u;
       // Taking 8 off a key leaves a half below the entry distance's own, and so below the exact
-      // distance that was rounded to it. Not a number, so below nothing, where there is no second
-      // child or it is entered at once.
+      // distance that was rounded to it. In the ray's t that is t0 and so many ticks: 2^-20 off the
+      // tick covers the approximate reciprocal's last place and the product's rounding, and the sum
+      // is rounded down. Not a number, and so never behind a hit, where there is no second child or
+      // it is entered at once.
       const float second =
           __half2float(__ushort_as_half(static_cast<unsigned short>(least.second - 8u)));
       children.others = __fmaf_rd(second, tick * (1.0f - 0x1p-20f), t0);

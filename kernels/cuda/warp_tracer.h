@@ -223,7 +223,8 @@ __device__ OCTRACE_FORCE_INLINE std::uint64_t take_rays(unsigned idle, unsigned 
 }
 
 // Between the children to visit and inner_mask, a group has the upper half of a float: a distance
-// before any of its children but the nearest is entered.
+// before any of its children but the nearest is entered. It is at least 0, so that cutting off the
+// lower half rounds it down.
 inline constexpr std::uint32_t kBoundBits = 0x00ffff00u;
 
 __device__ OCTRACE_FORCE_INLINE float bound_of(const WalkGroup& group) {

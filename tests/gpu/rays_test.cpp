@@ -78,10 +78,10 @@ class GpuRays {
 
 struct GpuRaysTest : testing::TestWithParam<std::size_t> {};
 
-TEST_P(GpuRaysTest, HitWhatTheCpuHits) {
-  if (const std::string why = render::cuda_unavailable(0); !why.empty()) GTEST_SKIP() << why;
-  const Mesh mesh = hard_meshes()[GetParam()];
-  const octree::Octree octree = std::move(*octree::build(mesh.input(), {}));
+void compare_with_cpu(const Mesh& mesh, octree::Builder builder) {
+  octree::BuildOptions options;
+  options.builder = builder;
+  const octree::Octree octree = std::move(*octree::build(mesh.input(), options));
   GpuRays gpu(octree);
   kernels::SceneView view;
   view.octree = octree.view();
@@ -102,6 +102,15 @@ TEST_P(GpuRaysTest, HitWhatTheCpuHits) {
   }
   EXPECT_EQ(0u, differing) << mesh.name;
   EXPECT_GT(hit_count, 0u);
+}
+
+TEST_P(GpuRaysTest, HitWhatTheCpuHits) {
+  if (const std::string why = render::cuda_unavailable(0); !why.empty()) GTEST_SKIP() << why;
+  const Mesh mesh = hard_meshes()[GetParam()];
+  for (const auto builder : {octree::Builder::sah, octree::Builder::quality}) {
+    SCOPED_TRACE(octree::name_of(builder));
+    compare_with_cpu(mesh, builder);
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(Meshes, GpuRaysTest, testing::Range<std::size_t>(0, hard_meshes().size()));
