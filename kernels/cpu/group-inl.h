@@ -9,13 +9,10 @@
 #define OCTRACE_GROUP_INL
 #endif
 
-#include "kernels/cpu/wide_walk-inl.h"
+#include "kernels/cpu/group_leaf-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace octrace::kernels::HWY_NAMESPACE {
-
-inline constexpr std::uint32_t kGroupRays = 64;
-using RaySet = std::uint64_t;  // a bit a ray
 
 // Groups that are taken in turns, a step each, so that one's cache misses pass while the others
 // work.
@@ -24,105 +21,6 @@ inline constexpr std::uint32_t kGroups = 8;
 // Where a step, of a node or a leaf, is worth fewer than five halves of rays, they cost less in a
 // stream.
 inline constexpr std::uint32_t kLeastRays = 5, kPerSteps = 2;
-
-struct alignas(64) RayGroup {
-  float origin[3][kGroupRays], direction[3][kGroupRays], inverse[3][kGroupRays];
-  // A plane p is met at p * inverse + enter where a box is entered, + leave where it is left.
-  float enter[3][kGroupRays], leave[3][kGroupRays];
-  std::uint32_t entered[3][kGroupRays];  // where a node keeps the planes that are entered, in bytes
-  float tmin[kGroupRays], tmax[kGroupRays];
-  RayState state[kGroupRays];
-  RaySet alive;                 // those that look for more
-  std::uint32_t first, count;   // which rays these are; none: the group is not in use
-  std::uint32_t depth;          // entries on the stack
-  std::uint32_t steps, visits;  // taken, and rays that took part in them
-  // Bounds over the rays.
-  float lower[3], upper[3];  // of the origins
-  float edge, plane, ahead;  // see candidates() in wide_walk-inl.h
-  // By ray, what it meets of a node or a leaf: a bit a child, or a triangle.
-  alignas(64) std::uint8_t bits[kGroupRays + 8];
-  alignas(64) WideRef stack_ref[kWideStack];
-  RaySet stack_set[kWideStack];
-  float stack_t[kWideStack];  // where the first of its rays enters it; unused for any hit
-
-  Vec3 origin_of(std::uint32_t i) const { return Vec3(origin[0][i], origin[1][i], origin[2][i]); }
-  Vec3 direction_of(std::uint32_t i) const {
-    return Vec3(direction[0][i], direction[1][i], direction[2][i]);
-  }
-  SlabRay slab_ray(std::uint32_t i) const {
-    return {origin_of(i), 0, Vec3(inverse[0][i], inverse[1][i], inverse[2][i])};
-  }
-};
-
-OCTRACE_FORCE_INLINE std::uint32_t lowest(RaySet set) {
-  return static_cast<std::uint32_t>(__builtin_ctzll(set));
-}
-
-HWY_ATTR HWY_INLINE void begin(const WideView& tree, const Ray* rays, std::uint32_t count,
-                               RayGroup& g) {
-  const Floats d;
-  const Words du;
-  using V = hn::Vec<Floats>;
-  const std::uint32_t filled = (count + 7) & ~7u;
-  for (std::uint32_t i = 0; i < filled; ++i) {
-    const Ray& ray = rays[i < count ? i : count - 1];
-    for (int axis = 0; axis < 3; ++axis) {
-      g.origin[axis][i] = ray.origin[axis];
-      g.direction[axis][i] = ray.direction[axis];
-    }
-    g.tmin[i] = ray.tmin;
-    g.tmax[i] = ray.tmax;
-    g.state[i] = {{ray.tmax, 0.0f, 0.0f, kNone}, ray.tmax, 0};
-  }
-  const RaySet all = count == kGroupRays ? ~RaySet{0} : (RaySet{1} << count) - 1;
-  V largest = hn::Zero(d), smallest = hn::Set(d, std::numeric_limits<float>::infinity());
-  V lower[3], upper[3];
-  for (int axis = 0; axis < 3; ++axis) lower[axis] = upper[axis] = hn::Load(d, g.origin[axis]);
-  const V zero = hn::Zero(d), one = hn::Set(d, 1.0f), tiny = hn::Set(d, kTinyDirection);
-  for (std::uint32_t first = 0; first < filled; first += 8) {
-    V length = zero;
-    for (std::uint32_t axis = 0; axis < 3; ++axis) {
-      const V x = hn::Load(d, g.direction[axis] + first);
-      const V o = hn::Load(d, g.origin[axis] + first);
-      length = hn::Max(length, hn::Abs(x));
-      const auto negative = hn::Lt(x, zero);
-      const V kept = hn::IfThenElse(hn::Lt(hn::Abs(x), tiny),
-                                    hn::IfThenElse(negative, hn::Neg(tiny), tiny), x);
-      const V inverse = hn::Div(one, kept);
-      const V base = hn::Neg(hn::Mul(o, inverse));
-      // 2^-24 of it here, in the sums below, and in the planes that visit_node() pads.
-      const V lost = hn::Mul(hn::Abs(base), hn::Set(d, 0x1p-22f));
-      hn::Store(inverse, d, g.inverse[axis] + first);
-      hn::Store(hn::Sub(base, lost), d, g.enter[axis] + first);
-      hn::Store(hn::Add(base, lost), d, g.leave[axis] + first);
-      hn::Store(hn::IfThenElse(hn::RebindMask(du, negative), hn::Set(du, axis * 64 + 32),
-                               hn::Set(du, axis * 64)),
-                du, g.entered[axis] + first);
-      lower[axis] = hn::Min(lower[axis], o);
-      upper[axis] = hn::Max(upper[axis], o);
-    }
-    largest = hn::Max(largest, length);
-    smallest = hn::Min(smallest, length);
-  }
-  float farthest = 0.0f;
-  for (int axis = 0; axis < 3; ++axis) {
-    g.lower[axis] = hn::GetLane(hn::MinOfLanes(d, lower[axis]));
-    g.upper[axis] = hn::GetLane(hn::MaxOfLanes(d, upper[axis]));
-    farthest = greater(farthest,
-                       greater(tree.upper[axis] - g.lower[axis], g.upper[axis] - tree.lower[axis]));
-  }
-  const float most = hn::GetLane(hn::MaxOfLanes(d, largest));
-  const bool sane = farthest * farthest * greater(farthest, most) < 1e30f;
-  const float infinity = std::numeric_limits<float>::infinity();
-  g.edge = sane ? most * 0x1p-16f : infinity;
-  g.plane = sane ? 0x1p-15f : infinity;
-  g.ahead = 0x1p-11f / hn::GetLane(hn::MinOfLanes(d, smallest));
-  g.alive = g.stack_set[0] = all;
-  g.stack_ref[0] = 0;
-  g.stack_t[0] = -std::numeric_limits<float>::infinity();
-  g.depth = 1;
-  g.steps = g.visits = 0;
-}
 
 // By insertion: there are few. Of equal distances the last one comes first, as with single rays.
 HWY_ATTR HWY_INLINE void sort_far_to_near(RayGroup& g, std::uint32_t first, std::uint32_t end) {
@@ -187,12 +85,13 @@ HWY_ATTR HWY_INLINE std::uint32_t visit_node(const WideView& tree, WideRef ref, 
   const std::uint32_t start = depth;
   alignas(32) float near_of[8];
   if constexpr (kNearest) hn::Store(least, d, near_of);
-  const hn::FixedTag<std::uint8_t, 32> db;
+  const hn::CappedTag<std::uint8_t, kGroupRays> db;
+  const auto low = hn::Load(db, g.bits), high = hn::Load(db, g.bits + kGroupRays - hn::Lanes(db));
   for (std::uint32_t slot = 0; slot < 8; ++slot) {
     const auto bit = hn::Set(db, static_cast<std::uint8_t>(1u << slot));
     std::uint8_t raw[16];
-    hn::StoreMaskBits(db, hn::TestBit(hn::Load(db, g.bits), bit), raw);
-    hn::StoreMaskBits(db, hn::TestBit(hn::Load(db, g.bits + 32), bit), raw + 4);
+    hn::StoreMaskBits(db, hn::TestBit(low, bit), raw);
+    if (hn::Lanes(db) < kGroupRays) hn::StoreMaskBits(db, hn::TestBit(high, bit), raw + 4);
     RaySet met;
     __builtin_memcpy(&met, raw, sizeof met);
     met &= set;
@@ -203,40 +102,6 @@ HWY_ATTR HWY_INLINE std::uint32_t visit_node(const WideView& tree, WideRef ref, 
   }
   if constexpr (kNearest) sort_far_to_near(g, start, depth);
   return depth;
-}
-
-template <class Query>
-HWY_ATTR HWY_INLINE void visit_leaf(const WideView& tree, const SceneView& scene,
-                                    const RenderParams& params, WideRef ref, RaySet set,
-                                    RayGroup& g) {
-  const Floats d;
-  const std::uint32_t n = leaf_count(ref);
-  const float* rows = tree.leaf(ref);
-  const LeafLanes leaf = load_leaf(rows, n);
-  auto far = hn::Zero(d);
-  for (int axis = 0; axis < 3; ++axis) {
-    far = hn::Max(far, hn::Max(hn::Sub(leaf.a[axis], hn::Set(d, g.lower[axis])),
-                               hn::Sub(hn::Set(d, g.upper[axis]), leaf.a[axis])));
-  }
-  const LeafMargins margins =
-      leaf_margins(leaf, hn::Add(far, leaf.reach), g.edge, g.plane, g.ahead);
-  RaySet hopeful = 0;
-  for (RaySet left = set; left != 0; left &= left - 1) {
-    const std::uint32_t i = lowest(left);
-    const std::uint32_t found =
-        candidates(leaf, margins, g.origin_of(i), g.direction_of(i), g.tmin[i], g.tmax[i]) &
-        ((1u << n) - 1u);
-    g.bits[i] = static_cast<std::uint8_t>(found);
-    hopeful |= static_cast<RaySet>(found != 0) << i;
-  }
-  for (; hopeful != 0; hopeful &= hopeful - 1) {
-    const std::uint32_t i = lowest(hopeful);
-    if (test<Query>(scene, params, rows, n, g.bits[i], g.slab_ray(i),
-                    make_triangle_ray(g.direction_of(i)), g.tmin[i], g.state[i])) {
-      g.alive &= ~(RaySet{1} << i);
-    }
-    g.tmax[i] = g.state[i].tmax;
-  }
 }
 
 // The rays that have found nothing before t.
@@ -262,14 +127,14 @@ HWY_ATTR HWY_INLINE bool step(const WideView& tree, const SceneView& scene,
     --depth;
     ref = g.stack_ref[depth];
     set = g.stack_set[depth] & g.alive;
-    if constexpr (Query::kNearest) set &= beyond(g, g.stack_t[depth]);
+    if constexpr (!Query::kAnyHit) set &= beyond(g, g.stack_t[depth]);
   }
   ++g.steps;
   g.visits += static_cast<std::uint32_t>(__builtin_popcountll(set));
   if (ref & kLeafRef) {
     visit_leaf<Query>(tree, scene, params, ref, set, g);
   } else {
-    depth = visit_node<Query::kNearest>(tree, ref, set, g, depth);
+    depth = visit_node<!Query::kAnyHit>(tree, ref, set, g, depth);
   }
   g.depth = depth;
   if (depth != 0) prefetch(tree, g.stack_ref[depth - 1]);

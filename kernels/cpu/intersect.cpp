@@ -118,11 +118,15 @@ HWY_ATTR HWY_INLINE void trace_one(const WideView& tree, const SceneView& scene,
   begin(tree, from, 0, ray);
   while (ray.ref != kDoneRef) {
     if ((ray.ref & kLeafRef) == 0) {
-      visit_node<Query::kNearest>(tree, ray);
+      visit_node<!Query::kAnyHit>(tree, ray);
       continue;
     }
-    const std::uint32_t left = candidates(tree, ray);
-    if (left != 0 && test<Query>(tree, scene, params, ray, left)) return;
+    const Candidates found = candidates<Query>(tree, params, ray);
+    if (found.certain != 0) {
+      ray.opacity = kOpacityBlocked;
+      return;
+    }
+    if (found.likely != 0 && test<Query>(tree, scene, params, ray, found.likely)) return;
     ray.pop();
   }
 }

@@ -8,7 +8,8 @@
 #define OCTRACE_PACKET_INL
 #endif
 
-#include "kernels/cpu/wide_walk-inl.h"
+#include "kernels/cpu/triangle_lanes-inl.h"
+#include "kernels/cpu/wide_leaf-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace octrace::kernels::HWY_NAMESPACE {
@@ -30,7 +31,7 @@ struct alignas(64) Packet {
   // the distance least, planes that are left from the one that makes it most.
   float enter_origin[3], leave_origin[3], least[3], most[3], slope[3];
   float beam_tmin, beam_tmax;
-  // For rays of one origin: what candidates() in wide_walk-inl.h keeps for one ray.
+  // For rays of one origin: what candidates() in wide_leaf-inl.h keeps for one ray.
   bool one_origin;
   float edge, ahead;
   std::uint32_t octant, enter[3];
@@ -53,32 +54,19 @@ HWY_ATTR HWY_INLINE void prepare(Packet& p, std::uint32_t first) {
   const Floats d;
   using V = hn::Vec<Floats>;
   const V zero = hn::Zero(d), one = hn::Set(d, 1.0f);
-  V dir[3], inv[3];
+  V dir[3];
   for (int axis = 0; axis < 3; ++axis) {
     const V x = dir[axis] = hn::Load(d, &p.direction[axis][first]);
     const V tiny = hn::Set(d, kTinyDirection);
     const V kept = hn::IfThenElse(hn::Lt(hn::Abs(x), tiny),
                                   hn::IfThenElse(hn::Lt(x, zero), hn::Neg(tiny), tiny), x);
-    inv[axis] = hn::Div(one, kept);
-    hn::Store(inv[axis], d, &p.inverse[axis][first]);
+    hn::Store(hn::Div(one, kept), d, &p.inverse[axis][first]);
   }
-  const V ax = hn::Abs(dir[0]), ay = hn::Abs(dir[1]), az = hn::Abs(dir[2]);
-  const auto z = hn::And(hn::Ge(az, ax), hn::Ge(az, ay));
-  const auto y = hn::Ge(ay, ax);  // where not z
-  const auto pick = [&](V if_x, V if_y, V if_z)
-                        HWY_ATTR { return hn::IfThenElse(z, if_z, hn::IfThenElse(y, if_y, if_x)); };
-  const V dk = pick(dir[0], dir[1], dir[2]);
-  const V i = hn::Neg(hn::Div(pick(dir[1], dir[2], dir[0]), dk));  // row_x's scale
-  const V j = hn::Neg(hn::Div(pick(dir[2], dir[0], dir[1]), dk));  // row_y's
-  const V r = hn::Div(one, dk);
-  const V x_row[3] = {pick(i, zero, one), pick(one, i, zero), pick(zero, one, i)};
-  const V y_row[3] = {pick(j, one, zero), pick(zero, j, one), pick(one, zero, j)};
-  const V z_row[3] = {pick(r, zero, zero), pick(zero, r, zero), pick(zero, zero, r)};
-  const auto negative = hn::Lt(dk, zero);
+  const ShearLanes shear = make_shear(dir);
   for (int axis = 0; axis < 3; ++axis) {
-    hn::Store(hn::IfThenElse(negative, y_row[axis], x_row[axis]), d, &p.row[0][axis][first]);
-    hn::Store(hn::IfThenElse(negative, x_row[axis], y_row[axis]), d, &p.row[1][axis][first]);
-    hn::Store(z_row[axis], d, &p.row[2][axis][first]);
+    hn::Store(shear.row_x[axis], d, &p.row[0][axis][first]);
+    hn::Store(shear.row_y[axis], d, &p.row[1][axis][first]);
+    hn::Store(shear.row_z[axis], d, &p.row[2][axis][first]);
   }
 }
 
@@ -174,7 +162,7 @@ HWY_ATTR HWY_INLINE auto meet(const Packet& p, const Vectors& enter, const Vecto
   return hn::Le(near, far);
 }
 
-// candidates() of wide_walk-inl.h, for rays of one origin: what all of them share, a triangle a
+// candidates() of wide_leaf-inl.h, for rays of one origin: what all of them share, a triangle a
 // lane.
 struct LeafVolumes {
   alignas(32) float u[3][8], v[3][8], normal[3][8];
@@ -247,57 +235,7 @@ HWY_ATTR HWY_INLINE bool test(const SceneView& scene, const RenderParams& params
   const Floats d;
   const Words du;
   using V = hn::Vec<Floats>;
-  const auto corner = [&](std::uint32_t r) HWY_ATTR { return hn::Set(d, rows[r * n + place]); };
   const auto of_ray = [&](const float* from) HWY_ATTR { return hn::Load(d, from + first); };
-  const V ox = of_ray(p.origin[0]), oy = of_ray(p.origin[1]), oz = of_ray(p.origin[2]);
-  const V x_a = hn::Sub(corner(0), ox), y_a = hn::Sub(corner(1), oy), z_a = hn::Sub(corner(2), oz);
-  const V x_b = hn::Sub(corner(3), ox), y_b = hn::Sub(corner(4), oy), z_b = hn::Sub(corner(5), oz);
-  const V x_c = hn::Sub(corner(6), ox), y_c = hn::Sub(corner(7), oy), z_c = hn::Sub(corner(8), oz);
-  const auto shear8 = [&](int row, V x, V y, V z) HWY_ATTR {
-    return hn::MulAdd(of_ray(p.row[row][0]), x,
-                      hn::MulAdd(of_ray(p.row[row][1]), y, hn::Mul(of_ray(p.row[row][2]), z)));
-  };
-  const auto edge8 = [&](V ax, V ay, V bx, V by)
-                         HWY_ATTR { return hn::Sub(hn::Mul(ax, by), hn::Mul(ay, bx)); };
-  const V ax = shear8(0, x_a, y_a, z_a), ay = shear8(1, x_a, y_a, z_a);
-  const V bx = shear8(0, x_b, y_b, z_b), by = shear8(1, x_b, y_b, z_b);
-  const V cx = shear8(0, x_c, y_c, z_c), cy = shear8(1, x_c, y_c, z_c);
-  const V wa = edge8(cx, cy, bx, by), wb = edge8(ax, ay, cx, cy), wc = edge8(bx, by, ax, ay);
-  const V zero = hn::Zero(d);
-  const V least = hn::Min(hn::Min(wa, wb), wc), most = hn::Max(hn::Max(wa, wb), wc);
-  const auto mixed = hn::And(hn::Lt(least, zero), hn::Gt(most, zero));
-  if (hn::AllTrue(d, mixed)) return false;
-
-  const V det = hn::Add(hn::Add(wa, wb), wc);
-  const V scaled =
-      hn::Add(hn::Add(hn::Mul(wa, shear8(2, x_a, y_a, z_a)), hn::Mul(wb, shear8(2, x_b, y_b, z_b))),
-              hn::Mul(wc, shear8(2, x_c, y_c, z_c)));
-  const V widest = hn::Max(hn::Max(hn::Abs(ax), hn::Abs(bx)), hn::Abs(cx));
-  const V highest = hn::Max(hn::Max(hn::Abs(ay), hn::Abs(by)), hn::Abs(cy));
-  const V thin = hn::Mul(hn::Mul(widest, highest), hn::Set(d, kThinTriangle));
-  const V lower[3] = {hn::Sub(hn::Min(hn::Min(corner(0), corner(3)), corner(6)), ox),
-                      hn::Sub(hn::Min(hn::Min(corner(1), corner(4)), corner(7)), oy),
-                      hn::Sub(hn::Min(hn::Min(corner(2), corner(5)), corner(8)), oz)};
-  const V upper[3] = {hn::Sub(hn::Max(hn::Max(corner(0), corner(3)), corner(6)), ox),
-                      hn::Sub(hn::Max(hn::Max(corner(1), corner(4)), corner(7)), oy),
-                      hn::Sub(hn::Max(hn::Max(corner(2), corner(5)), corner(8)), oz)};
-  const V mx = hn::Max(hn::Abs(lower[0]), hn::Abs(upper[0]));
-  const V my = hn::Max(hn::Abs(lower[1]), hn::Abs(upper[1]));
-  const V mz = hn::Max(hn::Abs(lower[2]), hn::Abs(upper[2]));
-  const V padding = hn::Mul(hn::Max(hn::Max(mx, my), mz), hn::Set(d, kBoxPadding));
-  V nears[3], fars[3];
-  for (int axis = 0; axis < 3; ++axis) {
-    const V i = of_ray(p.inverse[axis]);
-    const V a = hn::Mul(hn::Sub(lower[axis], padding), i);
-    const V b = hn::Mul(hn::Add(upper[axis], padding), i);
-    const bool negative = (p.octant >> axis) & 1;
-    nears[axis] = negative ? b : a;
-    fars[axis] = negative ? a : b;
-  }
-  const V near = hn::Max(hn::Max(nears[0], nears[1]), nears[2]);
-  const V far = hn::Min(hn::Min(fars[0], fars[1]), fars[2]);
-  const V t = hn::Min(hn::Max(hn::Div(scaled, det), near), far);
-
   const auto word = [&](std::uint32_t r) {
     std::uint32_t bits;
     __builtin_memcpy(&bits, &rows[r * n + place], sizeof bits);
@@ -305,12 +243,22 @@ HWY_ATTR HWY_INLINE bool test(const SceneView& scene, const RenderParams& params
   };
   const std::uint32_t id = word(kRowTriangle), flags = word(kRowFlags);
   const bool cull = ClosestQuery::culls(params, flags);
-  const auto exact = hn::AndNot(
-      mixed, hn::Or(hn::Or(hn::Eq(wa, zero), hn::Eq(wb, zero)),
-                    hn::Or(hn::Or(hn::Eq(wc, zero), hn::Eq(t, zero)), hn::Lt(hn::Abs(det), thin))));
-  auto hit = hn::AndNot(mixed, hn::And(hn::Le(near, far), hn::Ge(t, of_ray(p.tmin))));
-  hit = hn::AndNot(exact, hit);
-  if (cull) hit = hn::AndNot(hn::Lt(least, zero), hit);
+  RayLanes rays;
+  TriangleLanes triangle;
+  for (std::uint32_t axis = 0; axis < 3; ++axis) {
+    rays.origin[axis] = of_ray(p.origin[axis]);
+    rays.inverse[axis] = of_ray(p.inverse[axis]);
+    rays.shear.row_x[axis] = of_ray(p.row[0][axis]);
+    rays.shear.row_y[axis] = of_ray(p.row[1][axis]);
+    rays.shear.row_z[axis] = of_ray(p.row[2][axis]);
+    triangle.a[axis] = hn::Set(d, rows[axis * n + place]);
+    triangle.b[axis] = hn::Set(d, rows[(3 + axis) * n + place]);
+    triangle.c[axis] = hn::Set(d, rows[(6 + axis) * n + place]);
+  }
+  triangle.cull = hn::Lt(hn::Zero(d), hn::Set(d, cull ? 1.0f : 0.0f));
+  const HitLanes found = intersect_lanes(rays, triangle);
+  const V t = found.t;
+  auto hit = hn::And(found.hit, hn::Ge(t, of_ray(p.tmin)));
   const V tmax = of_ray(p.tmax);
   // Of equal distances the lowest index counts; kNone is above all of them.
   const auto owner = hn::Load(du, p.triangle + first);
@@ -322,12 +270,14 @@ HWY_ATTR HWY_INLINE bool test(const SceneView& scene, const RenderParams& params
     changed = true;
     hn::Store(hn::IfThenElse(hit, t, tmax), d, p.tmax + first);
     hn::Store(hn::IfThenElse(hit, t, of_ray(p.t)), d, p.t + first);
-    hn::Store(hn::IfThenElse(hit, hn::Div(wb, det), of_ray(p.u)), d, p.u + first);
-    hn::Store(hn::IfThenElse(hit, hn::Div(wc, det), of_ray(p.v)), d, p.v + first);
+    hn::Store(hn::IfThenElse(hit, hn::Div(found.weight_b, found.determinant), of_ray(p.u)), d,
+              p.u + first);
+    hn::Store(hn::IfThenElse(hit, hn::Div(found.weight_c, found.determinant), of_ray(p.v)), d,
+              p.v + first);
     hn::Store(hn::IfThenElse(hn::RebindMask(du, hit), hn::Set(du, id), owner), du,
               p.triangle + first);
   }
-  const auto singly = holes ? hn::Or(exact, hit) : exact;
+  const auto singly = holes ? hn::Or(found.unsure, hit) : found.unsure;
   if (hn::AllFalse(d, singly)) return changed;
   std::uint8_t bits[8];
   hn::StoreMaskBits(d, singly, bits);
@@ -336,16 +286,16 @@ HWY_ATTR HWY_INLINE bool test(const SceneView& scene, const RenderParams& params
     const auto point = [&](std::uint32_t r) {
       return Vec3(rows[r * n + place], rows[(r + 1) * n + place], rows[(r + 2) * n + place]);
     };
-    TriangleHit found;
+    TriangleHit one;
     if (!intersect_triangle(p.slab_ray(k), p.triangle_ray(k), point(0), point(3), point(6),
-                            p.tmin[k], p.tmax[k], cull, &found)) {
+                            p.tmin[k], p.tmax[k], cull, &one)) {
       continue;
     }
-    if (found.t == p.tmax[k] && id > p.triangle[k]) continue;
-    if (holes && !alpha_passes(scene, scene.triangle_geometry[id], id, found.u, found.v)) continue;
-    p.tmax[k] = p.t[k] = found.t;
-    p.u[k] = found.u;
-    p.v[k] = found.v;
+    if (one.t == p.tmax[k] && id > p.triangle[k]) continue;
+    if (holes && !alpha_passes(scene, scene.triangle_geometry[id], id, one.u, one.v)) continue;
+    p.tmax[k] = p.t[k] = one.t;
+    p.u[k] = one.u;
+    p.v[k] = one.v;
     p.triangle[k] = id;
     changed = true;
   }

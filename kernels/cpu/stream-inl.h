@@ -8,7 +8,7 @@
 #define OCTRACE_STREAM_INL
 #endif
 
-#include "kernels/cpu/wide_walk-inl.h"
+#include "kernels/cpu/wide_leaf-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace octrace::kernels::HWY_NAMESPACE {
@@ -60,15 +60,18 @@ HWY_ATTR HWY_INLINE void trace_stream(const WideView& from, const SceneView& sce
     std::uint32_t size = nodes.take();
     for (std::uint32_t i = 0; i < size; ++i) {
       WideRay* walk = nodes.walks[i];
-      visit_node<Query::kNearest>(tree, *walk);
+      visit_node<!Query::kAnyHit>(tree, *walk);
       enqueue(tree, walk, queues);
     }
     size = leaves.take();
     for (std::uint32_t i = 0; i < size; ++i) {
       WideRay* walk = leaves.walks[i];
-      const std::uint32_t left = candidates(tree, *walk);
+      const Candidates found = candidates<Query>(tree, params, *walk);
+      const bool certain = found.certain != 0;
+      const std::uint32_t left = certain ? 0 : found.likely;
       const std::uint32_t top = walk->depth - 1;
-      const WideRef ref = walk->stack_ref[top];
+      const WideRef ref = certain ? kDoneRef : walk->stack_ref[top];
+      if constexpr (Query::kAnyHit) walk->opacity = certain ? kOpacityBlocked : walk->opacity;
       const float t = walk->stack_t[top];
       walk->candidates = left;
       walk->depth = left == 0 ? top : top + 1;
