@@ -34,7 +34,7 @@ class CpuTracer {
                             std::uint32_t count, float* transmittances) const {
     return transmittance_stream_(wide_, scene, params, rays, count, transmittances);
   }
-  // The same for rays of which every sixteen in a row lie close together, as a camera's do.
+  // The same for rays of which every 32 in a row lie close together, as a camera's do.
   TraceStatus closest_coherent(const SceneView& scene, const RenderParams& params, const Ray* rays,
                                std::uint32_t count, Hit* hits) const {
     return closest_packets_(wide_, scene, params, rays, count, hits);

@@ -14,12 +14,12 @@
 HWY_BEFORE_NAMESPACE();
 namespace octrace::kernels::HWY_NAMESPACE {
 
-inline constexpr std::uint32_t kPacketVectors = 2;
+inline constexpr std::uint32_t kPacketVectors = 4;
 inline constexpr std::uint32_t kPacketRays = 8 * kPacketVectors;
 
 // A packet that needs more steps than this, of a node or half a triangle each, is not coherent
-// enough: its rays cost less in a stream.
-inline constexpr std::uint32_t kPacketSteps = 512;
+// enough: its rays cost less in a group.
+inline constexpr std::uint32_t kPacketSteps = 80;
 
 struct alignas(64) Packet {
   float origin[3][kPacketRays], direction[3][kPacketRays], inverse[3][kPacketRays];

@@ -73,17 +73,17 @@ struct Wide : testing::TestWithParam<std::size_t> {
     return std::move(*octree);
   }
 
-  // Random rays; with `spread` > 0 every sixteen in a row are a bundle around the first.
+  // Random rays; with `spread` > 0 every `bundle` in a row lie around the first.
   std::vector<Ray> make_rays(const octree::Octree& octree, std::mt19937_64& random,
-                             std::size_t count, float spread) const {
+                             std::size_t count, float spread, std::size_t bundle) const {
     std::uniform_real_distribution<float> unit(-1.0f, 1.0f);
     std::vector<Ray> rays;
     for (std::size_t i = 0; i < count; ++i) {
-      if (spread == 0.0f || i % 16 == 0) {
+      if (spread == 0.0f || i % bundle == 0) {
         rays.push_back(random_ray(mesh, octree, random));
         continue;
       }
-      Ray ray = rays[i - i % 16];
+      Ray ray = rays[i - i % bundle];
       for (int axis = 0; axis < 3; ++axis) {
         ray.direction[axis] *= 1.0f + spread * unit(random);
         if (random() % 4 == 0) ray.origin[axis] *= 1.0f + spread * unit(random);
@@ -156,10 +156,11 @@ TEST_P(Wide, HitsWhatBruteForceHits) {
     for (const Builder builder : {Builder::median, Builder::sah, Builder::quality}) {
       const octree::Octree octree = build(builder);
       std::mt19937_64 random(seed() + GetParam() * 7919 + static_cast<std::uint64_t>(builder));
-      for (const float spread : {0.0f, 0.05f, 1e-3f}) {
+      for (const auto& [spread, bundle] :
+           {std::pair{0.0f, 1u}, {0.05f, 16u}, {0.05f, 32u}, {1e-3f, 32u}}) {
         SCOPED_TRACE(testing::Message()
                      << mesh.name << ", seed " << seed() << ", spread " << spread);
-        check(octree, make_rays(octree, random, scaled(20'000) + 5, spread));
+        check(octree, make_rays(octree, random, scaled(20'000) + 5, spread, bundle));
       }
       SCOPED_TRACE(testing::Message() << mesh.name << ", seed " << seed() << ", fans");
       check(octree, make_fans(octree, random, scaled(20'000) + 5));
