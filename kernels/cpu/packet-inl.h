@@ -386,9 +386,9 @@ HWY_ATTR HWY_INLINE bool trace_packet(const WideView& tree, const SceneView& sce
       leave[axis] = hn::Load(d, reinterpret_cast<const float*>(bytes + (p.enter[axis] ^ 32)));
     }
     const auto met = meet(p, enter, leave, tmin, &near);
-    hn::StoreU(hn::Compress(near, met), d, p.stack_t + depth);
-    hn::StoreU(hn::Compress(hn::Load(du, node.child), hn::RebindMask(du, met)), du,
-               p.stack_ref + depth);
+    const ToFront front(met);
+    hn::StoreU(front(near), d, p.stack_t + depth);
+    hn::StoreU(front(hn::Load(du, node.child)), du, p.stack_ref + depth);
     const std::uint32_t end = depth + static_cast<std::uint32_t>(hn::CountTrue(d, met));
     sort_far_to_near(p, depth, end);
     depth = end;
