@@ -22,6 +22,16 @@ inline constexpr std::uint32_t kGroups = 8;
 // stream.
 inline constexpr std::uint32_t kLeastRays = 5, kPerSteps = 2;
 
+// Rays in all steps of a group, after which its rays are left to a stream: origins far apart, or
+// rays that come from either side, can lead a group through most of a scene.
+inline constexpr std::uint32_t kMostVisits = kGroupRays * 256;
+
+// Rays that trace_groups() began and gave up.
+struct GivenUp {
+  std::uint32_t first[kGroups], count[kGroups];
+  std::uint32_t groups = 0;
+};
+
 // By insertion: there are few. Of equal distances the last one comes first, as with single rays.
 HWY_ATTR HWY_INLINE void sort_far_to_near(RayGroup& g, std::uint32_t first, std::uint32_t end) {
   for (std::uint32_t i = first + 1; i < end; ++i) {
@@ -141,13 +151,14 @@ HWY_ATTR HWY_INLINE bool step(const WideView& tree, const SceneView& scene,
   return true;
 }
 
-// Calls store(index, ray) for rays from rays[0] on and returns for how many: all of `count`, or
-// fewer where they go such different ways that they cost less on their own.
+// Calls store(index, ray) for rays from rays[0] on, but for those given up, and returns how many it
+// has begun: all of `count`, or fewer where they go such different ways that they cost less on
+// their own.
 template <class Query, class Store>
 HWY_ATTR HWY_INLINE std::uint32_t trace_groups(const WideView& from, const SceneView& scene,
                                                const RenderParams& params, const Ray* rays,
                                                std::uint32_t count, RayGroup* groups,
-                                               const Store& store) {
+                                               GivenUp& given_up, const Store& store) {
   const WideView tree = from;  // so that stores leave it in registers
   std::uint32_t next = 0, active = 0;
   const auto start = [&](RayGroup& g) HWY_ATTR {
@@ -165,16 +176,22 @@ HWY_ATTR HWY_INLINE std::uint32_t trace_groups(const WideView& from, const Scene
   while (active != 0) {
     for (std::uint32_t k = 0; k < kGroups; ++k) {
       RayGroup& g = groups[k];
-      if (g.count == 0 || step<Query>(tree, scene, params, g)) continue;
+      if (g.count == 0) continue;
+      if (g.visits > kMostVisits) {
+        given_up.first[given_up.groups] = g.first;
+        given_up.count[given_up.groups++] = g.count;
+        g.count = 0;
+        --active;
+        count = next;  // so at most kGroups are given up
+        continue;
+      }
+      if (step<Query>(tree, scene, params, g)) continue;
       for (std::uint32_t i = 0; i < g.count; ++i) store(g.first + i, g.state[i]);
       g.count = 0;
       --active;
       steps = steps / 2 + g.steps;
       visits = visits / 2 + g.visits;
-      if (kPerSteps * visits < kLeastRays * steps) {
-        count = next;
-        continue;
-      }
+      if (kPerSteps * visits < kLeastRays * steps) count = next;
       start(g);
       for (std::uint32_t j = 1; alone && j < kGroups; ++j) start(groups[j]);
       alone = false;

@@ -186,12 +186,19 @@ HWY_ATTR HWY_INLINE void trace_many(const WideView& tree, const SceneView& scene
                                     std::uint32_t count, const Store& store) {
   RayGroup groups[kGroups];
   for (std::uint32_t first = 0; first < count;) {
-    const auto put = [&](std::uint32_t i, const RayState& ray) HWY_ATTR { store(first + i, ray); };
-    const std::uint32_t grouped =
-        trace_groups<Query>(tree, scene, params, rays + first, count - first, groups, put);
+    GivenUp apart;
+    const std::uint32_t grouped = trace_groups<Query>(
+        tree, scene, params, rays + first, count - first, groups, apart,
+        [&](std::uint32_t i, const RayState& ray) HWY_ATTR { store(first + i, ray); });
+    for (std::uint32_t k = 0; k < apart.groups; ++k) apart.first[k] += first;
     first += grouped;
     const std::uint32_t streamed = count - first < kStreamed ? count - first : kStreamed;
-    trace_stream<Query>(tree, scene, params, rays + first, streamed, put);
+    for (std::uint32_t k = 0; k <= apart.groups; ++k) {
+      const std::uint32_t begin = k < apart.groups ? apart.first[k] : first;
+      trace_stream<Query>(
+          tree, scene, params, rays + begin, k < apart.groups ? apart.count[k] : streamed,
+          [&](std::uint32_t i, const RayState& ray) HWY_ATTR { store(begin + i, ray); });
+    }
     first += streamed;
   }
 }

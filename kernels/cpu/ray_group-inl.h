@@ -67,7 +67,7 @@ HWY_ATTR HWY_INLINE void begin(const WideView& tree, const Ray* rays, std::uint3
   const RaySet all = count == kGroupRays ? ~RaySet{0} : (RaySet{1} << count) - 1;
   V largest = hn::Zero(d), smallest = hn::Set(d, std::numeric_limits<float>::infinity());
   V lower[3], upper[3];
-  for (int axis = 0; axis < 3; ++axis) lower[axis] = upper[axis] = hn::Load(d, g.origin[axis]);
+  for (int axis = 0; axis < 3; ++axis) lower[axis] = smallest, upper[axis] = hn::Neg(smallest);
   const V zero = hn::Zero(d), one = hn::Set(d, 1.0f), tiny = hn::Set(d, kTinyDirection);
   for (std::uint32_t first = 0; first < filled; first += 8) {
     V length = zero;
@@ -88,11 +88,12 @@ HWY_ATTR HWY_INLINE void begin(const WideView& tree, const Ray* rays, std::uint3
       hn::Store(hn::IfThenElse(hn::RebindMask(du, negative), hn::Set(du, axis * 64 + 32),
                                hn::Set(du, axis * 64)),
                 du, g.entered[axis] + first);
-      lower[axis] = hn::Min(lower[axis], o);
-      upper[axis] = hn::Max(upper[axis], o);
+      // In this order a ray that is no number leaves the bounds as they are: x86 takes the second.
+      lower[axis] = hn::Min(o, lower[axis]);
+      upper[axis] = hn::Max(o, upper[axis]);
     }
-    largest = hn::Max(largest, length);
-    smallest = hn::Min(smallest, length);
+    largest = hn::Max(length, largest);
+    smallest = hn::Min(length, smallest);
   }
   float farthest = 0.0f;
   for (int axis = 0; axis < 3; ++axis) {

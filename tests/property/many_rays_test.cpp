@@ -4,8 +4,10 @@
 #include <gtest/gtest.h>
 #include <hwy/targets.h>
 
+#include <cmath>
 #include <cstdio>
 #include <cstring>
+#include <limits>
 #include <random>
 
 #include "backend/octree/wide.h"
@@ -95,6 +97,8 @@ std::vector<Ray> make_rays(const SoupScene& scene, std::size_t count) {
       if (i % 2 == 0) ray.direction = target - ray.origin;
       if (block == 2) ray.tmax = 0.2f / std::max(length(ray.direction), 1e-3f);
     }
+    if (i % 1000 == 999) ray.direction = Vec3(std::numeric_limits<float>::quiet_NaN());
+    if (i % 3000 == 2998) ray.origin *= 1e6f;  // whose group it would lead through all of the scene
     rays.push_back(ray);
   }
   return rays;
@@ -133,6 +137,7 @@ void check(const SoupScene& scene, const std::vector<Ray>& rays) {
               tracer.transmittance(view, params, rays.data(), count, clear.data()));
     std::uint64_t kinds[kKinds] = {}, dimmed = 0;
     for (std::uint32_t i = 0; i < count; ++i) {
+      if (std::isnan(rays[i].direction.x)) continue;  // its neighbours have to be right
       Hit expected;
       float transmittance = -1.0f;
       ASSERT_EQ(TraceStatus::ok,
