@@ -8,6 +8,7 @@
 #define OCTRACE_PACKET_INL
 #endif
 
+#include "kernels/cpu/load_rays-inl.h"
 #include "kernels/cpu/triangle_lanes-inl.h"
 #include "kernels/cpu/wide_leaf-inl.h"
 
@@ -73,25 +74,30 @@ HWY_ATTR HWY_INLINE void prepare(Packet& p, std::uint32_t first) {
 // False: the rays' directions have different signs, so that no order of visits suits them all.
 HWY_ATTR HWY_INLINE bool begin(const WideView& tree, const Ray* rays, std::uint32_t count,
                                Packet& p) {
-  std::uint32_t all = 7, any = 0;
-  for (std::uint32_t i = 0; i < kPacketRays; ++i) {
-    const Ray& ray = rays[i < count ? i : count - 1];
-    std::uint32_t octant = 0;
-    for (int axis = 0; axis < 3; ++axis) {
-      p.origin[axis][i] = ray.origin[axis];
-      p.direction[axis][i] = ray.direction[axis];
-      octant |= (ray.direction[axis] < 0.0f ? 1u : 0u) << axis;
-    }
-    p.tmin[i] = ray.tmin;
-    p.tmax[i] = p.t[i] = ray.tmax;
-    p.u[i] = p.v[i] = 0.0f;
-    p.triangle[i] = kNone;
-    all &= octant;
-    any |= octant;
-  }
-  if (all != any) return false;
-  p.octant = all;
   const Floats d;
+  const auto zero = hn::Zero(d);
+  std::uint32_t all[3] = {0xffu, 0xffu, 0xffu}, any[3] = {};  // lanes with a negative direction
+  for (std::uint32_t first = 0; first < kPacketRays; first += 8) {
+    const LoadedRays loaded = load_rays(rays, count, first);
+    for (int axis = 0; axis < 3; ++axis) {
+      hn::Store(loaded.origin[axis], d, p.origin[axis] + first);
+      hn::Store(loaded.direction[axis], d, p.direction[axis] + first);
+      const std::uint32_t negative = bits_of(hn::Lt(loaded.direction[axis], zero));
+      all[axis] &= negative;
+      any[axis] |= negative;
+    }
+    hn::Store(loaded.tmin, d, p.tmin + first);
+    hn::Store(loaded.tmax, d, p.tmax + first);
+    hn::Store(loaded.tmax, d, p.t + first);
+    hn::Store(zero, d, p.u + first);
+    hn::Store(zero, d, p.v + first);
+    hn::Store(hn::Set(Words(), kNone), Words(), p.triangle + first);
+  }
+  p.octant = 0;
+  for (std::uint32_t axis = 0; axis < 3; ++axis) {
+    if (any[axis] != 0 && all[axis] != 0xffu) return false;
+    p.octant |= (any[axis] & 1u) << axis;
+  }
   for (std::uint32_t first = 0; first < kPacketRays; first += 8) prepare(p, first);
   const auto least = [&](const float* from) HWY_ATTR {
     auto v = hn::Load(d, from);
@@ -106,7 +112,7 @@ HWY_ATTR HWY_INLINE bool begin(const WideView& tree, const Ray* rays, std::uint3
   p.one_origin = true;
   float farthest = 0.0f;
   for (int axis = 0; axis < 3; ++axis) {
-    const bool negative = (all >> axis) & 1;
+    const bool negative = (p.octant >> axis) & 1;
     const float lower = least(p.origin[axis]), upper = most(p.origin[axis]);
     p.one_origin &= lower == upper;
     farthest = greater(farthest,

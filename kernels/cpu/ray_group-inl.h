@@ -7,7 +7,7 @@
 #define OCTRACE_RAY_GROUP_INL
 #endif
 
-#include "kernels/cpu/wide_walk-inl.h"
+#include "kernels/cpu/load_rays-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace octrace::kernels::HWY_NAMESPACE {
@@ -53,27 +53,23 @@ HWY_ATTR HWY_INLINE void begin(const WideView& tree, const Ray* rays, std::uint3
   const Floats d;
   const Words du;
   using V = hn::Vec<Floats>;
-  const std::uint32_t filled = (count + 7) & ~7u;
-  for (std::uint32_t i = 0; i < filled; ++i) {
-    const Ray& ray = rays[i < count ? i : count - 1];
-    for (int axis = 0; axis < 3; ++axis) {
-      g.origin[axis][i] = ray.origin[axis];
-      g.direction[axis][i] = ray.direction[axis];
-    }
-    g.tmin[i] = ray.tmin;
-    g.tmax[i] = ray.tmax;
-    g.state[i] = {{ray.tmax, 0.0f, 0.0f, kNone}, ray.tmax, 0};
+  for (std::uint32_t i = 0; i < count; ++i) {
+    g.state[i] = {{rays[i].tmax, 0.0f, 0.0f, kNone}, rays[i].tmax, 0};
   }
   const RaySet all = count == kGroupRays ? ~RaySet{0} : (RaySet{1} << count) - 1;
   V largest = hn::Zero(d), smallest = hn::Set(d, std::numeric_limits<float>::infinity());
   V lower[3], upper[3];
   for (int axis = 0; axis < 3; ++axis) lower[axis] = smallest, upper[axis] = hn::Neg(smallest);
   const V zero = hn::Zero(d), one = hn::Set(d, 1.0f), tiny = hn::Set(d, kTinyDirection);
-  for (std::uint32_t first = 0; first < filled; first += 8) {
+  for (std::uint32_t first = 0; first < count; first += 8) {
+    const LoadedRays loaded = load_rays(rays, count, first);
+    hn::Store(loaded.tmin, d, g.tmin + first);
+    hn::Store(loaded.tmax, d, g.tmax + first);
     V length = zero;
     for (std::uint32_t axis = 0; axis < 3; ++axis) {
-      const V x = hn::Load(d, g.direction[axis] + first);
-      const V o = hn::Load(d, g.origin[axis] + first);
+      const V x = loaded.direction[axis], o = loaded.origin[axis];
+      hn::Store(x, d, g.direction[axis] + first);
+      hn::Store(o, d, g.origin[axis] + first);
       length = hn::Max(length, hn::Abs(x));
       const auto negative = hn::Lt(x, zero);
       const V kept = hn::IfThenElse(hn::Lt(hn::Abs(x), tiny),
