@@ -4,9 +4,11 @@
 include(GNUInstallDirs)
 
 # DT_RPATH, not DT_RUNPATH: it also serves the libraries that those libraries need, so that none of
-# them needs a path of its own.
+# them needs a path of its own. In the build tree as well: CMake would keep room for the path by
+# colons there, and each of 258 libraries would be looked for 10 times in the current folder.
 function(octrace_relocatable target)
-  set_target_properties(${target} PROPERTIES INSTALL_RPATH "$ORIGIN/../lib")
+  set_target_properties(${target} PROPERTIES
+    INSTALL_RPATH "$ORIGIN/../lib" BUILD_WITH_INSTALL_RPATH ON)
   target_link_options(${target} PRIVATE -Wl,--disable-new-dtags)
 endfunction()
 
