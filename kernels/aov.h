@@ -42,4 +42,17 @@ struct FramebufferView {
   }
 };
 
+// The same planes, but all null except these: what is written through it is known when it is
+// compiled, so that a loop over pixels asks no pixel which planes there are.
+template <Aov... kKept>
+struct PlanesOf {
+  const FramebufferView& all;
+
+  OCTRACE_HD static constexpr bool keeps(Aov aov) { return ((aov == kKept) || ...); }
+  OCTRACE_HD bool any() const { return ((all.planes[static_cast<int>(kKept)] != nullptr) || ...); }
+  OCTRACE_HD std::uint64_t pixel(std::uint32_t x, std::uint32_t y) const { return all.pixel(x, y); }
+  OCTRACE_HD float* floats(Aov aov) const { return keeps(aov) ? all.floats(aov) : nullptr; }
+  OCTRACE_HD std::uint32_t* uints(Aov aov) const { return keeps(aov) ? all.uints(aov) : nullptr; }
+};
+
 }  // namespace octrace::kernels

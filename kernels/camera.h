@@ -16,9 +16,23 @@ struct RayCamera {
   Vec3 axis;          // unit, the way the camera looks
 };
 
+// A ray's two parts: what x alone gives, and what y adds to it. For many pixels each is computed
+// once a column and once a row.
+struct CameraRayPart {
+  Vec3 origin, direction;
+};
+OCTRACE_HD inline CameraRayPart camera_column(const RayCamera& camera, float x) {
+  return {camera.origin + x * camera.origin_x, camera.direction + x * camera.direction_x};
+}
+OCTRACE_HD inline CameraRayPart camera_row(const RayCamera& camera, float y) {
+  return {y * camera.origin_y, y * camera.direction_y};
+}
+OCTRACE_HD inline Ray camera_ray(const RayCamera& camera, const CameraRayPart& column,
+                                 const CameraRayPart& row) {
+  return {column.origin + row.origin, camera.znear, column.direction + row.direction, camera.zfar};
+}
 OCTRACE_HD inline Ray camera_ray(const RayCamera& camera, float x, float y) {
-  return {camera.origin + x * camera.origin_x + y * camera.origin_y, camera.znear,
-          camera.direction + x * camera.direction_x + y * camera.direction_y, camera.zfar};
+  return camera_ray(camera, camera_column(camera, x), camera_row(camera, y));
 }
 
 }  // namespace octrace::kernels

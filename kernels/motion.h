@@ -55,14 +55,14 @@ OCTRACE_HD inline Vec2 motion_of(const SceneView& scene, const MotionView& motio
 
 // What trace_geometry() does with a hit beside its own planes.
 struct NoMotion {
-  template <class Scene>
-  OCTRACE_HD void operator()(const Scene&, const HitOf<Scene>&, const FramebufferView&,
+  template <class Scene, class Planes>
+  OCTRACE_HD void operator()(const Scene&, const HitOf<Scene>&, const Planes&,
                              std::uint64_t) const {}
 };
 struct MotionPlane {
   const MotionView& motion;
-  template <class Scene>
-  OCTRACE_HD void operator()(const Scene& scene, const HitOf<Scene>& hit, const FramebufferView& to,
+  template <class Scene, class Planes>
+  OCTRACE_HD void operator()(const Scene& scene, const HitOf<Scene>& hit, const Planes& to,
                              std::uint64_t pixel) const {
     const Vec2 value = hit.valid() ? motion_of(scene, motion, hit) : Vec2(0.0f);
     float* plane = to.floats(Aov::motion);

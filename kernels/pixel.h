@@ -25,7 +25,9 @@ OCTRACE_HD inline void store(float* plane, std::uint64_t pixel, const Vec4& valu
   plane[4 * pixel + 3] = value.w;
 }
 
-OCTRACE_HD inline void store_background(const FramebufferView& to, std::uint64_t pixel) {
+// `to`: a FramebufferView or PlanesOf.
+template <class Planes>
+OCTRACE_HD inline void store_background(const Planes& to, std::uint64_t pixel) {
   constexpr float kFar = std::numeric_limits<float>::infinity();
   if (float* plane = to.floats(Aov::depth)) plane[pixel] = kFar;
   if (float* plane = to.floats(Aov::distance)) plane[pixel] = kFar;
@@ -41,9 +43,9 @@ OCTRACE_HD inline void store_background(const FramebufferView& to, std::uint64_t
   if (std::uint32_t* plane = to.uints(Aov::primitive_id)) plane[pixel] = 0;
 }
 
-template <class Scene>
+template <class Scene, class Planes>
 OCTRACE_HD inline void store_hit(const Scene& scene, const Ray& ray, const HitOf<Scene>& hit,
-                                 const FramebufferView& to, std::uint64_t pixel) {
+                                 const Planes& to, std::uint64_t pixel) {
   const SceneView& arrays = arrays_of(scene, hit);
   const Geometry& geometry = arrays.geometries[arrays.triangle_geometry[hit.triangle]];
   if (float* plane = to.floats(Aov::depth)) plane[pixel] = hit.t;
@@ -75,11 +77,11 @@ OCTRACE_HD inline void store_hit(const Scene& scene, const Ray& ray, const HitOf
   }
 }
 
-// All planes but beauty, from what the ray through the pixel's centre found. `motion`: NoMotion or
-// MotionPlane.
-template <class Scene, class Motion = NoMotion>
+// All planes of `to` but beauty, from what the ray through the pixel's centre found. `motion`:
+// NoMotion or MotionPlane.
+template <class Scene, class Planes, class Motion = NoMotion>
 OCTRACE_HD inline void store_geometry(const Scene& scene, const Ray& ray, const HitOf<Scene>& hit,
-                                      const FramebufferView& to, std::uint32_t x, std::uint32_t y,
+                                      const Planes& to, std::uint32_t x, std::uint32_t y,
                                       const Motion& motion = {}) {
   const std::uint64_t pixel = to.pixel(x, y);
   if (hit.valid()) {

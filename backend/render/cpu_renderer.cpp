@@ -78,16 +78,44 @@ TileFailure visit_pixels(const Tile& tile, const Visit& visit) {
   return {};
 }
 
+// The planes of `kKept` for the pixels of a tile, from its rays and hits in the order of
+// visit_pixels().
+template <Aov... kKept, class Motion = kernels::NoMotion>
+void store_planes(const View& view, const kernels::SceneView& scene,
+                  const std::vector<kernels::Ray>& rays, const std::vector<kernels::Hit>& hits,
+                  const Tile& tile, const Motion& motion = {}) {
+  const kernels::PlanesOf<kKept...> planes{view.target};
+  if (!planes.any()) return;
+  std::size_t next = 0;
+  visit_pixels(tile, [&](std::uint32_t x, std::uint32_t y) {
+    store_geometry(scene, rays[next], hits[next], planes, x, y, motion);
+    ++next;
+    return TraceStatus::ok;
+  });
+}
+
+void camera_rays(const kernels::RayCamera& camera, const Tile& tile,
+                 std::vector<kernels::Ray>& rays) {
+  std::vector<kernels::CameraRayPart> columns, rows;
+  for (std::uint32_t x = tile.x0; x < tile.x1; ++x) {
+    columns.push_back(camera_column(camera, static_cast<float>(x) + 0.5f));
+  }
+  for (std::uint32_t y = tile.y0; y < tile.y1; ++y) {
+    rows.push_back(camera_row(camera, static_cast<float>(y) + 0.5f));
+  }
+  rays.resize(columns.size() * rows.size());
+  std::size_t next = 0;
+  visit_pixels(tile, [&](std::uint32_t x, std::uint32_t y) {
+    rays[next++] = camera_ray(camera, columns[x - tile.x0], rows[y - tile.y0]);
+    return TraceStatus::ok;
+  });
+}
+
 // The rays of a tile are traced together, because neighbours meet the same nodes.
 TileFailure trace_geometry_tile(const View& view, const kernels::SceneView& scene,
                                 const kernels::CpuTracer& tracer, const Tile& tile) {
   std::vector<kernels::Ray> rays;
-  rays.reserve(static_cast<std::size_t>(tile.x1 - tile.x0) * (tile.y1 - tile.y0));
-  visit_pixels(tile, [&](std::uint32_t x, std::uint32_t y) {
-    rays.push_back(
-        camera_ray(view.camera, static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f));
-    return TraceStatus::ok;
-  });
+  camera_rays(view.camera, tile, rays);
   std::vector<kernels::Hit> hits(rays.size());
   const TraceStatus status = tracer.closest_coherent(
       scene, view.params, rays.data(), static_cast<std::uint32_t>(rays.size()), hits.data());
@@ -96,17 +124,20 @@ TileFailure trace_geometry_tile(const View& view, const kernels::SceneView& scen
       return geometry_pixel(view, scene, tracer, x, y);
     });
   }
-  std::size_t next = 0;
-  return visit_pixels(tile, [&](std::uint32_t x, std::uint32_t y) {
-    const std::size_t i = next++;
-    if (view.motion == nullptr) {
-      store_geometry(scene, rays[i], hits[i], view.target, x, y);
-    } else {
-      store_geometry(scene, rays[i], hits[i], view.target, x, y,
-                     kernels::MotionPlane{*view.motion});
-    }
-    return TraceStatus::ok;
-  });
+  store_planes<Aov::depth>(view, scene, rays, hits, tile);
+  store_planes<Aov::distance>(view, scene, rays, hits, tile);
+  store_planes<Aov::mask>(view, scene, rays, hits, tile);
+  store_planes<Aov::barycentric>(view, scene, rays, hits, tile);
+  store_planes<Aov::object_id>(view, scene, rays, hits, tile);
+  store_planes<Aov::material_id>(view, scene, rays, hits, tile);
+  store_planes<Aov::primitive_id>(view, scene, rays, hits, tile);
+  // These share the surface that they are taken from.
+  store_planes<Aov::normal, Aov::geometric_normal, Aov::position, Aov::albedo, Aov::uv>(
+      view, scene, rays, hits, tile);
+  if (view.motion != nullptr) {
+    store_planes<Aov::motion>(view, scene, rays, hits, tile, kernels::MotionPlane{*view.motion});
+  }
+  return {};
 }
 
 TileFailure trace_tile(const View& view, const kernels::SceneView& scene,

@@ -4,13 +4,25 @@
 
 namespace octrace::render {
 
+namespace {
+constexpr std::size_t kLine = 16;  // words of a line of the cache, where planes begin
+}
+
 Framebuffer::Framebuffer(std::uint32_t width, std::uint32_t height, AovSet aovs)
     : width_(width), height_(height), aovs_(aovs) {
   const std::size_t pixels = static_cast<std::size_t>(width) * height;
+  std::array<std::size_t, kernels::kAovCount> begin{}, size{};
+  std::size_t words = 0;
   for (const AovInfo& info : aov_table()) {
     const auto plane = static_cast<std::size_t>(info.aov);
-    if (aovs.test(plane))
-      planes_[plane].resize(pixels * static_cast<std::size_t>(info.channel_count));
+    if (!aovs.test(plane)) continue;
+    begin[plane] = words;
+    size[plane] = pixels * static_cast<std::size_t>(info.channel_count);
+    words += (size[plane] + kLine - 1) / kLine * kLine;
+  }
+  words_ = util::HugeArray<std::uint32_t>(words);
+  for (std::size_t i = 0; i < planes_.size(); ++i) {
+    if (size[i] != 0) planes_[i] = {words_.data() + begin[i], size[i]};
   }
 }
 

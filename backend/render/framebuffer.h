@@ -7,8 +7,8 @@
 #include <span>
 #include <string>
 #include <string_view>
-#include <vector>
 
+#include "backend/util/huge_array.h"
 #include "backend/util/result.h"
 #include "kernels/aov.h"
 
@@ -47,7 +47,10 @@ class Framebuffer {
  private:
   std::uint32_t width_, height_;
   AovSet aovs_;
-  std::array<std::vector<std::uint32_t>, kernels::kAovCount> planes_;  // bits of float or uint32
+  // All planes, one after the other: bits of float or uint32. Zeroed, by the system: at once that
+  // would cost as much as tracing a view.
+  util::HugeArray<std::uint32_t> words_;
+  std::array<std::span<std::uint32_t>, kernels::kAovCount> planes_;
 };
 
 }  // namespace octrace::render

@@ -2,6 +2,7 @@
 
 #include <sys/mman.h>
 
+#include <algorithm>
 #include <cstdint>
 #include <new>
 
@@ -14,7 +15,9 @@ constexpr std::size_t kHugePage = std::size_t{2} << 20;
 HugeMemory::HugeMemory(std::size_t bytes) {
   if (bytes == 0) return;
   if (bytes > SIZE_MAX / 2) throw std::bad_alloc();
-  mapped_bytes_ = bytes + kHugePage;
+  // A rest of half a huge page and more takes a whole one; small arrays do not take 2 MiB.
+  const std::size_t huge_bytes = (bytes + kHugePage / 2) / kHugePage * kHugePage;
+  mapped_bytes_ = std::max(bytes, huge_bytes) + kHugePage;
   mapped_ =
       mmap(nullptr, mapped_bytes_, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
   if (mapped_ == MAP_FAILED) {
@@ -24,8 +27,7 @@ HugeMemory::HugeMemory(std::size_t bytes) {
   const auto address = reinterpret_cast<std::uintptr_t>(mapped_);
   const std::uintptr_t aligned = (address + kHugePage - 1) / kHugePage * kHugePage;
   data_ = reinterpret_cast<void*>(aligned);
-  // Only whole huge pages, so that small arrays do not take 2 MiB. A refusal costs speed alone.
-  madvise(data_, bytes / kHugePage * kHugePage, MADV_HUGEPAGE);
+  madvise(data_, huge_bytes, MADV_HUGEPAGE);  // a refusal costs speed alone
 }
 
 HugeMemory::~HugeMemory() {
