@@ -7,6 +7,7 @@
 
 #include "backend/app/command.h"
 #include "backend/image/image.h"
+#include "backend/util/heap.h"
 #include "backend/util/interrupt.h"
 #include "backend/util/log.h"
 #include "backend/util/version.h"
@@ -98,6 +99,7 @@ int flush_results(int code) {
 }  // namespace octrace::app
 
 int main(int argc, char** argv) {
+  octrace::util::keep_freed_memory();
   const int code = octrace::app::flush_results(octrace::app::run_guarded(argc, argv));
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
   octrace::image::finish_preload();  // sanitizers report from exit handlers

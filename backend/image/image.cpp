@@ -14,6 +14,7 @@
 
 #include "backend/image/module.h"
 #include "backend/util/atomic_file.h"
+#include "backend/util/heap.h"
 #include "backend/util/version.h"
 
 namespace octrace::image {
@@ -121,9 +122,15 @@ const Image::Plane* Image::find(const std::string& name) const {
   return found == planes.end() ? nullptr : &*found;
 }
 
+// OpenImageIO makes its table of texts (OIIO::ustring) of 8192 pieces of 2 and 4 KiB.
+constexpr std::size_t kLibraryHeap = std::size_t{28} << 20;
+
 void preload() {
   preload_begun = true;
-  std::thread([] { module(); }).detach();
+  std::thread([] {
+    util::prepare_thread_heap(kLibraryHeap);
+    module();
+  }).detach();
 }
 
 void finish_preload() {
