@@ -13,6 +13,7 @@
 #include "backend/batch/objects_file.h"
 #include "backend/batch/state.h"
 #include "backend/util/atomic_file.h"
+#include "backend/util/grouped_commit.h"
 #include "backend/util/version.h"
 
 namespace octrace::batch {
@@ -126,14 +127,12 @@ class Files {
     }
     return annotations_ ? annotations_->add(line) : Result<void>();
   }
-  Result<void> finish() {
-    if (cameras_) {
-      if (auto ok = cameras_->finish(); !ok) return ok;
-    }
-    if (objects_) {
-      if (auto ok = objects_->finish(); !ok) return ok;
-    }
-    return annotations_ ? annotations_->finish() : Result<void>();
+  std::vector<std::function<Result<void>()>> commits() {
+    std::vector<std::function<Result<void>()>> all;
+    if (cameras_) all.emplace_back([this] { return cameras_->finish(); });
+    if (objects_) all.emplace_back([this] { return objects_->finish(); });
+    if (annotations_) all.emplace_back([this] { return annotations_->finish(); });
+    return all;
   }
 
  private:
@@ -207,7 +206,8 @@ ordered_json summary_of(const Plan& plan, const JobResults& results) {
 
 }  // namespace
 
-Result<JobResults> write_job_results(const Plan& plan) {
+Result<JobResults> write_job_results(const Plan& plan,
+                                     const std::function<Result<void>(const JobResults&)>& beside) {
   auto gathered = gather(plan);
   if (!gathered) return gathered.error();
   Files files;
@@ -218,8 +218,11 @@ Result<JobResults> write_job_results(const Plan& plan) {
     if (!line) return line.error();
     if (auto ok = files.add(*line); !ok) return ok.error();
   }
-  if (auto ok = files.finish(); !ok) return ok.error();
-  return count(plan, *gathered);
+  const JobResults results = count(plan, *gathered);
+  auto commits = files.commits();
+  commits.emplace_back([&] { return beside(results); });
+  if (auto ok = util::commit_together(plan.folder(), commits); !ok) return ok.error();
+  return results;
 }
 
 Result<JobResults> merge_job(const Plan& plan, const util::Limits& limits, double wait_lock) {
@@ -232,14 +235,12 @@ Result<JobResults> merge_job(const Plan& plan, const util::Limits& limits, doubl
   auto lock = RunLock::acquire(plan.folder(), Shard(), {wait_lock, true});
   if (!lock) return lock.error();
   if (auto same = check_same_job(plan, plan.meaning(limits)); !same) return same.error();
-  auto results = write_job_results(plan);
-  if (!results) return results.error();
-  const std::string text =
-      summary_of(plan, *results).dump(2, ' ', false, ordered_json::error_handler_t::replace) + "\n";
-  if (auto written = util::write_file(plan.folder() + "summary.json", text); !written) {
-    return written.error();
-  }
-  return results;
+  return write_job_results(plan, [&](const JobResults& results) {
+    return util::write_file(
+        plan.folder() + "summary.json",
+        summary_of(plan, results).dump(2, ' ', false, ordered_json::error_handler_t::replace) +
+            "\n");
+  });
 }
 
 }  // namespace octrace::batch

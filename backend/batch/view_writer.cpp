@@ -23,6 +23,8 @@ using util::Result;
 // Lines since the last flush are lost by a power cut, and their views rendered again.
 constexpr double kFlushSeconds = 1.0;
 constexpr std::uint64_t kFramebufferBytes = 2ull << 30;  // of all framebuffers, but for two
+// Views are traced while the image library is still loading: as many as cost little memory.
+constexpr std::uint64_t kSmallBytes = 64ull << 20, kMostSmall = 8;
 
 std::size_t most_framebuffers(const Plan& plan, unsigned threads) {
   std::uint64_t channels = 0;
@@ -33,9 +35,10 @@ std::size_t most_framebuffers(const Plan& plan, unsigned threads) {
   }
   const ImageSize& size = plan.job().size;
   const std::uint64_t bytes = std::uint64_t{size.width} * size.height * channels * 4;
-  const std::uint64_t fitting = kFramebufferBytes / std::max<std::uint64_t>(bytes, 1);
-  return static_cast<std::size_t>(
-      std::clamp<std::uint64_t>(fitting, 2, std::uint64_t{threads} + 2));
+  const auto fitting = [&](std::uint64_t most) { return most / std::max<std::uint64_t>(bytes, 1); };
+  const std::uint64_t wanted =
+      std::max(std::uint64_t{threads} + 2, std::min(fitting(kSmallBytes), kMostSmall));
+  return static_cast<std::size_t>(std::clamp<std::uint64_t>(fitting(kFramebufferBytes), 2, wanted));
 }
 
 // zlib's level 1, as a single render has it: level 4 takes longer and saves little.
@@ -111,7 +114,7 @@ void ViewWriter::finish() {
   threads_.clear();
   {
     const std::lock_guard lock(journal_mutex_);
-    if (auto flushed = flush(); !flushed) stop(flushed.error());
+    flush_folders();  // the journal is flushed after its last line
   }
   if (!packs_) return;
   const std::lock_guard lock(mutex_);
@@ -290,10 +293,14 @@ Result<void> ViewWriter::note(const ordered_json& line) {
 // The files' content was flushed before they were renamed, so a line whose file's name is lost by a
 // power cut is one of a missing file, which the next run notices.
 Result<void> ViewWriter::flush() {
-  for (const std::string& folder : unflushed_folders_) util::flush_folder(folder);
-  unflushed_folders_.clear();
+  flush_folders();
   since_flush_ = util::Timer();
   return journal_.flush();
+}
+
+void ViewWriter::flush_folders() {
+  for (const std::string& folder : unflushed_folders_) util::flush_folder(folder);
+  unflushed_folders_.clear();
 }
 
 void ViewWriter::stop(const util::Error& error) {

@@ -69,7 +69,9 @@ class ViewWriter {
                                                    std::vector<PackMember>& members);
   util::Result<void> keep(const nlohmann::ordered_json& line, std::vector<PackMember> members);
   util::Result<void> note(const nlohmann::ordered_json& line);
-  util::Result<void> flush();  // with journal_mutex_ held
+  // With journal_mutex_ held.
+  util::Result<void> flush();
+  void flush_folders();
   void stop(const util::Error& error);
 
   const Plan& plan_;

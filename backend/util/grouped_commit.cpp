@@ -3,6 +3,8 @@
 #include <fcntl.h>
 #include <unistd.h>
 
+#include <future>
+
 namespace octrace::util {
 
 namespace {
@@ -23,6 +25,24 @@ void flush_folder(const std::string& folder) {
   if (descriptor < 0) return;
   ::fsync(descriptor);
   ::close(descriptor);
+}
+
+Result<void> commit_together(const std::string& folder,
+                             const std::vector<std::function<Result<void>()>>& commits) {
+  std::vector<std::future<Result<void>>> running;
+  for (const auto& commit : commits) {
+    running.push_back(std::async(std::launch::async, [&commit] {
+      const GroupedCommit group;
+      return commit();
+    }));
+  }
+  Result<void> result;
+  for (auto& one : running) {
+    Result<void> committed = one.get();
+    if (result && !committed) result = std::move(committed);
+  }
+  flush_folder(folder);
+  return result;
 }
 
 }  // namespace octrace::util
