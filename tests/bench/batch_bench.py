@@ -11,6 +11,7 @@ import json
 import os
 import random
 import shutil
+import statistics
 import subprocess
 import tempfile
 import time
@@ -173,7 +174,7 @@ def kill(arguments, folder):
 def blender(arguments, folder):
     job = write_job(arguments, folder, 10, "out/{camera}.exr")
     shutil.rmtree(os.path.join(folder, "out"), True)
-    times = sorted(run(arguments, job)[0] for _ in range(3))
+    times = [run(arguments, job)[0] for _ in range(5)]
     poses = []
     with open(os.path.join(folder, "out/.octrace/journal-1-of-1.ndjson")) as file:
         for line in map(json.loads, file):
@@ -200,11 +201,21 @@ def blender(arguments, folder):
             os.remove(folder + "/b%d.exr" % i)  # it was made
         return seconds
 
-    together = start(poses)
-    apart = sum(start([pose]) for pose in poses[:3]) / 3 * len(poses)
-    print("ten views: octrace %.2f s (median of 3 processes); Blender in one process %.1f s (%.0f x), "
-          "in one process a view %.1f s (%.0f x; three measured)" %
-          (times[1], together, together / times[1], apart, apart / times[1]))
+    # In turns: machines that are shared change their speed within a minute.
+    together, apart = [], []
+    for pose in poses[:3]:
+        together.append(start(poses))
+        times += [run(arguments, job)[0] for _ in range(5)]
+        apart.append(start([pose]) * len(poses))
+        times += [run(arguments, job)[0] for _ in range(5)]
+
+    def told(seconds):
+        return "%.2f s (%.2f to %.2f)" % (statistics.median(seconds), min(seconds), max(seconds))
+    own = statistics.median(times)
+    print("ten views, medians: octrace %s, %d processes; Blender in one process %s, three times, %.1f x; "
+          "in one process a view %s, from three views, %.0f x" %
+          (told(times), len(times), told(together), statistics.median(together) / own, told(apart),
+           statistics.median(apart) / own))
 
 
 def main():
