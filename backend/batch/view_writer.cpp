@@ -23,10 +23,14 @@ using util::Result;
 // Lines since the last flush are lost by a power cut, and their views rendered again.
 constexpr double kFlushSeconds = 1.0;
 constexpr std::uint64_t kFramebufferBytes = 2ull << 30;  // of all framebuffers, but for two
-// Views are traced while the image library is still loading: as many as cost little memory.
-constexpr std::uint64_t kSmallBytes = 64ull << 20, kMostSmall = 8;
+// Of those that are filled before the first view is written: the image library is still loading.
+constexpr std::uint64_t kFirstBytes = 32ull << 20, kMostFirst = 8;
 
-std::size_t most_framebuffers(const Plan& plan, unsigned threads) {
+struct FramebufferCounts {
+  std::size_t steady, first;
+};
+
+FramebufferCounts framebuffer_counts(const Plan& plan, unsigned threads) {
   std::uint64_t channels = 0;
   for (const render::AovInfo& info : render::aov_table()) {
     if (plan.needed_aovs().test(static_cast<std::size_t>(info.aov))) {
@@ -34,11 +38,12 @@ std::size_t most_framebuffers(const Plan& plan, unsigned threads) {
     }
   }
   const ImageSize& size = plan.job().size;
-  const std::uint64_t bytes = std::uint64_t{size.width} * size.height * channels * 4;
-  const auto fitting = [&](std::uint64_t most) { return most / std::max<std::uint64_t>(bytes, 1); };
-  const std::uint64_t wanted =
-      std::max(std::uint64_t{threads} + 2, std::min(fitting(kSmallBytes), kMostSmall));
-  return static_cast<std::size_t>(std::clamp<std::uint64_t>(fitting(kFramebufferBytes), 2, wanted));
+  const std::uint64_t bytes =
+      std::max<std::uint64_t>(std::uint64_t{size.width} * size.height * channels * 4, 1);
+  const std::uint64_t steady =
+      std::clamp<std::uint64_t>(kFramebufferBytes / bytes, 2, std::uint64_t{threads} + 2);
+  const std::uint64_t first = std::max(steady, std::min(kFirstBytes / bytes, kMostFirst));
+  return {static_cast<std::size_t>(steady), static_cast<std::size_t>(first)};
 }
 
 // zlib's level 1, as a single render has it: level 4 takes longer and saves little.
@@ -68,15 +73,16 @@ ViewWriter::ViewWriter(const Plan& plan, Journal& journal, unsigned threads, std
     scratch_.emplace(std::move(*scratch));
     packs_.emplace(plan, [this](const ordered_json& line) { return note(line); });
   }
-  const std::size_t most = most_framebuffers(plan, threads);
-  const std::size_t writers = std::min<std::size_t>(threads, most - 1);
+  const FramebufferCounts counts = framebuffer_counts(plan, threads);
+  const std::size_t writers = std::min<std::size_t>(threads, counts.steady - 1);
   // All at once: were they made when first needed, a late moment of slow writing would add one, and
   // memory would grow with the number of views.
   const ImageSize& size = plan.job().size;
-  for (std::uint64_t i = 0; i < std::min<std::uint64_t>(most, views); ++i) {
+  for (std::uint64_t i = 0; i < std::min<std::uint64_t>(counts.first, views); ++i) {
     free_.push_back(
         std::make_unique<render::Framebuffer>(size.width, size.height, plan.needed_aovs()));
   }
+  spare_ = free_.size() - std::min(counts.steady, free_.size());
   for (std::size_t i = 0; i < writers; ++i) threads_.emplace_back([this] { work(); });
 }
 
@@ -84,7 +90,7 @@ ViewWriter::~ViewWriter() { finish(); }
 
 std::unique_ptr<render::Framebuffer> ViewWriter::acquire() {
   std::unique_lock lock(mutex_);
-  changed_.wait(lock, [&] { return outcome_.fatal || !free_.empty(); });
+  changed_.wait(lock, [&] { return outcome_.fatal || free_.size() > (writing_ ? spare_ : 0); });
   if (outcome_.fatal) return nullptr;
   auto framebuffer = std::move(free_.back());
   free_.pop_back();
@@ -94,6 +100,7 @@ std::unique_ptr<render::Framebuffer> ViewWriter::acquire() {
 void ViewWriter::give_back(std::unique_ptr<render::Framebuffer> framebuffer) {
   const std::lock_guard lock(mutex_);
   free_.push_back(std::move(framebuffer));
+  writing_ = true;
   changed_.notify_all();
 }
 

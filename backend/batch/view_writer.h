@@ -84,6 +84,9 @@ class ViewWriter {
   std::condition_variable changed_;
   std::deque<TracedView> queue_;
   std::vector<std::unique_ptr<render::Framebuffer>> free_;
+  // Framebuffers that are not used any more once the first one has come back.
+  std::size_t spare_ = 0;
+  bool writing_ = false;
   bool closed_ = false;
   Outcome outcome_;
 
