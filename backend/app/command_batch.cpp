@@ -2,6 +2,7 @@
 
 #include <charconv>
 #include <cstdio>
+#include <filesystem>
 #include <memory>
 
 #include "backend/app/batch_progress.h"
@@ -14,6 +15,7 @@
 #include "backend/batch/runner.h"
 #include "backend/batch/state.h"
 #include "backend/batch/summary.h"
+#include "backend/scene/builtin.h"
 #include "backend/util/interrupt.h"
 #include "backend/util/log.h"
 
@@ -112,6 +114,14 @@ Result<util::Exit> dry_run(const batch::Plan& plan, const BatchRequest& request)
       continue;
     }
     for (const batch::Output& file : plan.files(plan.view(index))) fmt::print("{}\n", file.path);
+  }
+  for (const batch::JobScene& scene : plan.job().scenes) {
+    std::error_code error;
+    if (!scene.source.starts_with(scene::kBuiltinPrefix) &&
+        !std::filesystem::exists(scene.source, error)) {
+      util::log_warning(
+          fmt::format("{}: there is no such file; its views will fail", scene.source));
+    }
   }
   util::log_info(fmt::format("{} views of {} scenes in this run, {} of them done; nothing was made",
                              end - begin, plan.job().scenes.size(), there));

@@ -36,7 +36,7 @@ struct RenderOptions {
   std::optional<std::string> aovs;
   std::string camera, size = "1280x720", sky, stats;
   kernels::RenderParams params;
-  std::uint32_t tile = 16;
+  std::uint32_t tile = 0;
   double depth_scale = 1000.0;
   std::string device = "auto";
   render::DeviceChoice device_choice;
@@ -112,13 +112,15 @@ void declare_running(CLI::App& command, RenderOptions& options) {
                   "auto, cpu, cuda or cuda:N; auto takes the GPU where there is one [auto]")
       ->type_name("DEVICE");
   command
-      .add_option("--tile", options.tile,
-                  "pixels a side of what a thread takes at once. Never changes the image [16]")
+      .add_option(
+          "--tile", options.tile,
+          "pixels a side of what a thread takes at once. Never changes the image [by the image]")
       ->check(CLI::Range(1, 4096).description(""))
       ->type_name("N");
   command
-      .add_option("--stats", options.stats,
-                  "write times, rays, octree figures and memory to this JSON file")
+      .add_option(
+          "--stats", options.stats,
+          "write times, rays, octree figures and memory to this JSON file; -: to standard output")
       ->type_name("FILE.json");
   add_choice<ProgressMode>(
       command, "--progress", options.progress,
@@ -166,7 +168,7 @@ util::Result<void> check_apart(const RenderOptions& options, const std::vector<O
   if (!options.camera.empty()) taken.insert(resolved(options.camera));
   std::vector<std::string> written;
   for (const Output& output : outputs) written.push_back(output.path);
-  if (!options.stats.empty()) written.push_back(options.stats);
+  if (!options.stats.empty() && options.stats != kStandardOutput) written.push_back(options.stats);
   for (const std::string& path : written) {
     if (!taken.insert(resolved(path)).second) {
       return usage_error(fmt::format("{}: would replace another file of this command", path));
@@ -211,7 +213,7 @@ util::Result<Plan> make_plan(RenderOptions& options) {
     if (!writable) return writable.error();
   }
   if (util::Result<void> apart = check_apart(options, plan.outputs); !apart) return apart.error();
-  if (!options.stats.empty()) {
+  if (!options.stats.empty() && options.stats != kStandardOutput) {
     util::Result<void> writable = batch::check_writable(options.stats);
     if (!writable) return writable.error();
   }

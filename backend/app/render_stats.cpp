@@ -52,7 +52,10 @@ util::Result<void> write_stats(const std::string& path, const RenderStats& stats
   json["octree"]["builder"] = octree::name_of(stats.builder);
   json["octree"]["walk_bytes"] = stats.trace.walk_bytes;
   json["peak_rss_bytes"] = util::peak_resident_bytes();
-  return util::write_file(path, json.dump(2) + "\n");
+  const std::string text = json.dump(2) + "\n";
+  if (path != kStandardOutput) return util::write_file(path, text);
+  fmt::print("{}", text);
+  return {};
 }
 
 namespace {

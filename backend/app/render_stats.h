@@ -26,6 +26,9 @@ struct RenderStats {
   }
 };
 
+inline constexpr const char* kStandardOutput = "-";
+
+// `path`: a file, or kStandardOutput.
 util::Result<void> write_stats(const std::string& path, const RenderStats& stats,
                                const batch::SceneSession& session);
 std::string summary(const RenderStats& stats, const batch::SceneSession& session);

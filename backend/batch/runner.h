@@ -33,7 +33,7 @@ struct RunOptions {
   bool force = false;
   double wait_lock = 0.0;  // seconds (LockWait)
   unsigned threads = 0;    // that trace, and as many that encode; 0: all cores
-  std::uint32_t tile = 16;
+  std::uint32_t tile = 0;
   bool verify = false;
   octree::BuildOptions build;
   render::DeviceChoice device;

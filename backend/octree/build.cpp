@@ -1,4 +1,6 @@
 #include <fmt/format.h>
+#include <tbb/global_control.h>
+#include <tbb/info.h>
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
@@ -142,6 +144,11 @@ util::Result<Octree> build(const BuildInput& input, const BuildOptions& options)
   if (options.threads == 0) {
     run();
   } else {
+    // Without this, an arena gets no more threads than the machine has cores, and TBB says so.
+    const tbb::global_control allow(
+        tbb::global_control::max_allowed_parallelism,
+        std::max<std::size_t>(options.threads,
+                              static_cast<std::size_t>(tbb::info::default_concurrency())));
     tbb::task_arena(static_cast<int>(options.threads)).execute(run);
   }
   return octree;

@@ -169,6 +169,21 @@ TileFailure trace_tile(const View& view, const kernels::InstancedSceneView& scen
   });
 }
 
+// The geometry's rays of a tile are traced together: more of them share more work, as long as there
+// are several tiles a thread. Beauty's go one by one, and their cost varies more.
+std::uint32_t tile_side(const Framebuffer& image, bool beauty, unsigned threads) {
+  constexpr std::uint32_t kLeast = 16, kMost = 64;
+  constexpr std::uint64_t kTilesPerThread = 8;
+  if (beauty) return kLeast;
+  const std::uint64_t pixels = std::uint64_t{image.width()} * image.height();
+  std::uint32_t side = kMost;
+  while (side > kLeast &&
+         pixels < std::uint64_t{side} * side * kTilesPerThread * effective_threads(threads)) {
+    side /= 2;
+  }
+  return side;
+}
+
 class CpuRenderer final : public Renderer {
  public:
   CpuRenderer(const scene::Scene& scene, const octree::Octree& octree)
@@ -230,7 +245,7 @@ util::Result<TraceStats> CpuRenderer::render(const kernels::RayCamera& camera,
   TileJob job;
   job.width = framebuffer.width();
   job.height = framebuffer.height();
-  job.tile = settings.tile;
+  job.tile = settings.tile != 0 ? settings.tile : tile_side(framebuffer, beauty, settings.threads);
   job.threads = settings.threads;
   job.progress = settings.progress;
   job.cancel = settings.cancel;

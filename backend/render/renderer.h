@@ -19,8 +19,8 @@ namespace octrace::render {
 
 struct Settings {
   kernels::RenderParams params;
-  unsigned threads = 0;     // 0: all
-  std::uint32_t tile = 16;  // pixels a side; never changes the image
+  unsigned threads = 0;    // 0: all
+  std::uint32_t tile = 0;  // pixels a side, 0: by the image; never changes the image
   // Called now and then from one thread at a time with the share of pixels done, 0 to 1.
   std::function<void(double)> progress;
   const std::atomic<bool>* cancel = nullptr;

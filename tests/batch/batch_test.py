@@ -138,6 +138,12 @@ class Jobs(BatchCase):
 
 
 class DryRun(BatchCase):
+    def test_says_that_a_scene_is_not_there(self):
+        self.job(scenes=["a.gltf", "none.glb"], cameras=[{"turntable": {"n": 1}}])
+        err = self.run_batch("--dry-run")[1]
+        self.assertIn("none.glb: there is no such file", err)
+        self.assertNotIn("a.gltf: there", err)
+
     def test_lists_every_file_and_makes_none(self):
         self.job(scenes=["a.gltf", {"path": "builtin:paper", "name": "../p q"}], frames="1-3:2",
                  cameras=[{"turntable": {"n": 2, "name": "t"}}],

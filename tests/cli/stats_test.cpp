@@ -1,6 +1,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "tests/cli/driver.h"
@@ -52,6 +53,24 @@ TEST(Stats, SayWhatWasDone) {
   EXPECT_GT(found["octree"]["bytes"], 1692 * 48);
   EXPECT_GT(found["octree"]["walk_bytes"], 0);
   EXPECT_GT(found["peak_rss_bytes"], 1 << 20);
+}
+
+TEST(Stats, GoToStandardOutputAndLeaveNoFile) {
+  Scratch scratch;
+  const Outcome outcome = run({"render", "builtin:paper", "--size", "8x6", "--aov", "Z", "-o",
+                               scratch.path("a.npz"), "--stats", "-"});
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_EQ(json::parse(outcome.out)["image"]["width"], 8);
+  EXPECT_FALSE(std::filesystem::exists("-"));
+}
+
+// TBB warned of them.
+TEST(Stats, MoreThreadsThanCoresAreTakenWithoutAWord) {
+  Scratch scratch;
+  const Outcome outcome = run({"render", "builtin:paper", "--size", "8x6", "--aov", "Z", "-o",
+                               scratch.path("a.npz"), "--threads", "600", "--quiet"});
+  EXPECT_EQ(outcome.exit_code, 0);
+  EXPECT_EQ(outcome.err, "");
 }
 
 TEST(Stats, DepthAloneTracesOneRayAPixel) {
