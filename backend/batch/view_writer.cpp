@@ -74,7 +74,8 @@ ViewWriter::ViewWriter(const Plan& plan, Journal& journal, unsigned threads, std
     packs_.emplace(plan, [this](const ordered_json& line) { return note(line); });
   }
   const FramebufferCounts counts = framebuffer_counts(plan, threads);
-  const std::size_t writers = std::min<std::size_t>(threads, counts.steady - 1);
+  // Two more than there are processors: some wait for the disk.
+  const std::size_t writers = std::min<std::size_t>(threads + 2, counts.steady - 1);
   // All at once: were they made when first needed, a late moment of slow writing would add one, and
   // memory would grow with the number of views.
   const ImageSize& size = plan.job().size;
@@ -149,30 +150,54 @@ void ViewWriter::work() {
     const bool stop = outcome_.fatal.has_value();
     lock.unlock();
     if (!stop && !util::interrupt_flag()) write(view);
-    give_back(std::move(view.framebuffer));
+    if (view.framebuffer) give_back(std::move(view.framebuffer));
   }
 }
 
 void ViewWriter::write(TracedView& view) {
   const util::Timer timer;
-  double flush_ms = 0.0;
   std::vector<PackMember> members;
-  auto files = [&]() -> Result<ordered_json> {
+  util::GroupedCommit group(scratch_ ? util::GroupedCommit::When::at_once
+                                     : util::GroupedCommit::When::by_finish);
+  auto encoded = [&]() -> Result<ordered_json> {
     try {
-      util::GroupedCommit group;
-      auto written = write_files(view, members);
-      flush_ms = group.milliseconds();
-      return written;
+      auto files = write_files(view, members);
+      if (!files) return files;
+      return view_line(view, std::move(*files));
     } catch (const std::bad_alloc&) {
       return util::Error{util::Exit::limit, "", "out of memory", "", ""};
     }
   }();
-  const double write_ms = timer.milliseconds();
-  if (!files) {
+  // The next view may be traced while this one waits for the disk.
+  give_back(std::move(view.framebuffer));
+  const auto failed = [&](const util::Error& error) {
     if (util::interrupt_flag()) return;  // dropped: the next run makes it
-    if (files.error().exit == util::Exit::io) return stop(files.error());
-    return fail({view.view.index, view.view.scene, 1, files.error()});
+    if (error.exit == util::Exit::io) return stop(error);
+    fail({view.view.index, view.view.scene, 1, error});
+  };
+  if (!encoded) return failed(encoded.error());
+  if (auto committed = group.finish(); !committed) return failed(committed.error());
+  ordered_json& line = *encoded;
+  const double write_ms = timer.milliseconds();
+  line["ms"] = {view.trace_ms, write_ms};
+  if (auto measured = scratch_ ? Result<void>() : measure_files(line); !measured) {
+    return failed(measured.error());
   }
+  if (auto kept = keep(line, std::move(members)); !kept) {
+    if (util::interrupt_flag()) return;
+    return stop(kept.error());
+  }
+  {
+    const std::lock_guard lock(mutex_);
+    ++outcome_.done;
+    outcome_.encode_ms += write_ms - group.milliseconds();
+    outcome_.flush_ms += group.milliseconds();
+  }
+  const std::lock_guard lock(report_mutex_);
+  report_();
+}
+
+ordered_json ViewWriter::view_line(const TracedView& view, ordered_json files) const {
   ordered_json line = {{"kind", "view"},
                        {"view", view.view.index},
                        {"scene", view.view.scene},
@@ -181,7 +206,7 @@ void ViewWriter::write(TracedView& view) {
                        {"frame", view.view.frame}};
   if (!plan_.job().frames.empty()) line["time"] = view.view.time;
   line["size"] = {view.framebuffer->width(), view.framebuffer->height()};
-  line["files"] = std::move(*files);
+  line["files"] = std::move(files);
   line["lens"] = ordered_json::parse(camera_json(view.camera));
   if (plan_.job().objects) {
     const render::Framebuffer& image = *view.framebuffer;
@@ -189,19 +214,20 @@ void ViewWriter::write(TracedView& view) {
         objects_record(find_objects(image.uints(kernels::Aov::object_id), image.width(),
                                     image.height(), plan_.job().coco_masks));
   }
-  line["ms"] = {view.trace_ms, write_ms};
-  if (auto kept = keep(line, std::move(members)); !kept) {
-    if (util::interrupt_flag()) return;
-    return stop(kept.error());
+  return line;
+}
+
+// The sizes of the line's files, which have their names by now.
+Result<void> ViewWriter::measure_files(ordered_json& line) {
+  for (ordered_json& file : line["files"]) {
+    const std::string path = plan_.folder() + file["path"].get<std::string>();
+    std::error_code error;
+    file["bytes"] = std::filesystem::file_size(path, error);
+    if (error) return util::Error{util::Exit::io, "IO_ERROR", error.message(), path, ""};
+    const std::lock_guard lock(journal_mutex_);
+    unflushed_folders_.insert(path.substr(0, path.rfind('/') + 1));
   }
-  {
-    const std::lock_guard lock(mutex_);
-    ++outcome_.done;
-    outcome_.encode_ms += write_ms - flush_ms;
-    outcome_.flush_ms += flush_ms;
-  }
-  const std::lock_guard lock(report_mutex_);
-  report_();
+  return {};
 }
 
 // The files are complete: the journal says so, or the pack does once it is whole.
@@ -249,14 +275,7 @@ Result<ordered_json> ViewWriter::write_files(const TracedView& view,
       members.push_back({name, std::move(*content)});
       continue;
     }
-    {
-      const std::lock_guard lock(journal_mutex_);
-      unflushed_folders_.insert(folder);
-    }
-    std::error_code error;
-    const auto bytes = std::filesystem::file_size(file.path, error);
-    if (error) return util::Error{util::Exit::io, "IO_ERROR", error.message(), file.path, ""};
-    files.push_back({{"path", file.path.substr(plan_.folder().size())}, {"bytes", bytes}});
+    files.push_back({{"path", file.path.substr(plan_.folder().size())}, {"bytes", 0}});
   }
   return files;
 }

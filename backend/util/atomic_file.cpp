@@ -94,6 +94,10 @@ AtomicFile::~AtomicFile() {
 Result<void> AtomicFile::commit() {
   if (interrupt_flag()) return Error{Exit::io, "", "not written: interrupted", target_, ""};
   GroupedCommit* const group = GroupedCommit::of_this_thread();
+  if (group != nullptr && group->waits()) {
+    group->add(std::move(*this));
+    return {};
+  }
   const Timer timer;
   const int descriptor = ::open(temporary_.c_str(), O_RDONLY | O_CLOEXEC);
   if (descriptor < 0) return io_error(target_, "cannot be reopened", errno);

@@ -20,7 +20,8 @@ class AtomicFile {
 
   // Keeps the target's extension, because image writers choose their format by it.
   const std::string& temporary() const { return temporary_; }
-  // fsync, rename, fsync of the folder. Refused after an interrupt (interrupt.h).
+  // fsync, rename, fsync of the folder; or as a GroupedCommit of the thread has it
+  // (grouped_commit.h). Refused after an interrupt (interrupt.h).
   Result<void> commit();
 
  private:

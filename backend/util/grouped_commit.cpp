@@ -13,9 +13,20 @@ thread_local GroupedCommit* current = nullptr;
 
 }  // namespace
 
-GroupedCommit::GroupedCommit() { current = this; }
+GroupedCommit::GroupedCommit(When when) : when_(when) { current = this; }
 
 GroupedCommit::~GroupedCommit() { current = nullptr; }
+
+Result<void> GroupedCommit::finish() {
+  finishing_ = true;
+  Result<void> result;
+  for (AtomicFile& file : files_) {
+    if (result = file.commit(); !result) break;
+  }
+  files_.clear();
+  finishing_ = false;
+  return result;
+}
 
 GroupedCommit* GroupedCommit::of_this_thread() { return current; }
 

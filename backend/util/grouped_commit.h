@@ -3,28 +3,40 @@
 
 #include <functional>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "backend/util/atomic_file.h"
 #include "backend/util/result.h"
 
 namespace octrace::util {
 
-// While one lives, files that its thread commits (atomic_file.h) are flushed and renamed, and the
-// caller flushes their folder: a rename survives a power cut only when its folder is flushed too.
-// Of the thread and not a parameter, because files are committed below layers to which flushing
-// means nothing. One at a time on a thread.
+// While one lives, files that its thread commits (atomic_file.h) are flushed and renamed, at once
+// or by finish(), and the caller flushes their folder: a rename survives a power cut only when its
+// folder is flushed too. Of the thread and not a parameter, because files are committed below
+// layers to which flushing means nothing. One at a time on a thread.
 class GroupedCommit {
  public:
-  GroupedCommit();
+  enum class When { at_once, by_finish };
+  explicit GroupedCommit(When when = When::at_once);
   GroupedCommit(const GroupedCommit&) = delete;
   GroupedCommit& operator=(const GroupedCommit&) = delete;
   ~GroupedCommit();
   static GroupedCommit* of_this_thread();  // or null
 
+  // Flushes and renames the files that wait, and stops at the first error; those that are left
+  // vanish.
+  Result<void> finish();
+
+  bool waits() const { return when_ == When::by_finish && !finishing_; }
+  void add(AtomicFile file) { files_.push_back(std::move(file)); }
   void add(double milliseconds) { milliseconds_ += milliseconds; }
   double milliseconds() const { return milliseconds_; }  // that flushing and renaming took
 
  private:
+  const When when_;
+  bool finishing_ = false;
+  std::vector<AtomicFile> files_;
   double milliseconds_ = 0.0;
 };
 
