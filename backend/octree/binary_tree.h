@@ -4,10 +4,10 @@
 
 #include <cstdint>
 #include <limits>
-#include <memory>
 
 #include "backend/octree/box.h"
 #include "backend/octree/octree.h"
+#include "backend/util/huge_vector.h"
 
 namespace octrace::octree {
 
@@ -24,6 +24,21 @@ struct alignas(32) Reference {
   float centre2(int axis) const { return lower[axis] - negated_upper[axis]; }
 };
 static_assert(sizeof(Reference) == 32);
+
+// A reference at the place of a leaf triangle: references without parts are kept in the memory of
+// the leaf triangles to come, which would lie idle while the tree is made, and each range of them
+// in that of its own triangles.
+struct alignas(16) LooseReference {
+  float lower[3];
+  std::uint32_t triangle;
+  float negated_upper[3];
+  std::uint32_t part;
+  std::uint32_t note;  // for whoever splits
+  std::uint32_t unused[3];
+
+  float centre2(int axis) const { return lower[axis] - negated_upper[axis]; }
+};
+static_assert(sizeof(LooseReference) == sizeof(kernels::LeafTriangle));
 
 // The bounds of references and of their centres, laid out like a Reference; words 3 and 7 mean
 // nothing.
@@ -65,8 +80,7 @@ static_assert(sizeof(BinaryNode) == 32);
 // pairs stay unused and uninitialised.
 struct BinaryTree {
   static constexpr std::uint32_t kRoot = 1;
-  std::unique_ptr<BinaryNode[]> nodes;
-  std::uint64_t size = 0;  // of nodes
+  util::HugeVector<BinaryNode> nodes;
 };
 
 }  // namespace octrace::octree

@@ -17,7 +17,7 @@
 #include "backend/octree/builders.h"
 #include "backend/octree/object_split.h"
 #include "backend/octree/spatial_split.h"
-#include "backend/util/huge_pages.h"
+#include "backend/util/huge_vector.h"
 
 namespace octrace::octree {
 
@@ -52,12 +52,8 @@ class BinaryBuilder {
     const auto room = static_cast<std::uint32_t>(
         std::min<double>(double{options_.duplicates} * count, 0x7fffffff - double(count)));
     const std::uint64_t most = std::uint64_t{count} + room;
-    references_[0] = large_array<Reference>(most);
-    if (count > kSubtree || room > 0) {
-      references_[1] = large_array<Reference>(most);
-    }
-    tree_.size = 2 * most;
-    tree_.nodes = large_array<BinaryNode>(tree_.size);
+    for (auto& references : references_) references.resize(most);
+    tree_.nodes.resize(2 * most);
     tbb::parallel_for(tbb::blocked_range<std::uint32_t>(0, count, kBlock), [&](const auto& r) {
       for (std::uint32_t i = r.begin(); i < r.end(); ++i) {
         const Box box = triangle_box(input_, i);
@@ -67,19 +63,13 @@ class BinaryBuilder {
                              0};
       }
     });
-    const Bounds8 bounds = bounds_of(references_[0].get(), count);
+    const Bounds8 bounds = bounds_of(references_[0].data(), count);
     root_area_ = bounds.half_area();
     build({0, count, room, 1}, BinaryTree::kRoot, bounds, 0, 0, 0);
     return std::move(tree_);
   }
 
  private:
-  template <class T>
-  static std::unique_ptr<T[]> large_array(std::uint64_t size) {
-    auto array = std::make_unique_for_overwrite<T[]>(size);
-    util::prefer_huge_pages(array.get(), size * sizeof(T));
-    return array;
-  }
   Bounds8 bounds_of(const Reference* references, std::uint32_t count) const {
     if (count <= 2 * kBlock) return splitter_.bounds(references, count);
     return tbb::parallel_reduce(
@@ -106,15 +96,16 @@ class BinaryBuilder {
   // `array`: which of the two holds the references.
   void build(const Range& range, std::uint32_t root, const Bounds8& bounds, int array, int depth,
              int misses) {
-    Reference* references = references_[array].get() + range.first;
+    Reference* references = references_[array].data() + range.first;
     if (range.count <= kSubtree && simple(range, bounds)) {
-      splitter_.subtree({references, range.count, tree_.nodes.get(), range.pair, root,
-                         options_.bins, std::max(options_.sah_depth - depth, 0)});
+      splitter_.subtree({references, references_[1 - array].data() + range.first, range.count,
+                         bounds, tree_.nodes.data(), range.pair, root, options_.bins,
+                         std::max(options_.sah_depth - depth, 0)});
       return;
     }
     Sides sides;
     const Chosen chosen = choose(range, references, bounds, depth, misses);
-    divide(range, references, bounds, chosen, references_[1 - array].get(), sides);
+    divide(range, references, bounds, chosen, references_[1 - array].data(), sides);
     write_node(tree_.nodes[root], bounds, range.pair, range.count);
     const auto lower = [&] {
       build(sides.lower, 2 * range.pair, sides.lower_bounds, 1 - array, depth + 1, chosen.misses);
@@ -339,7 +330,7 @@ class BinaryBuilder {
   const BuildInput& input_;
   const BinaryOptions options_;
   const ObjectSplitter splitter_;
-  std::unique_ptr<Reference[]> references_[2];
+  util::HugeVector<Reference> references_[2];
   BinaryTree tree_;
   float root_area_ = 0.0f;
 };

@@ -1,25 +1,30 @@
 // The SAH builders: a binary tree from above (build_binary.h), improved by reinsertion
 // (reinsert.h), collapsed into eight-way nodes (collapse.h).
 #include "backend/octree/build_binary.h"
+#include "backend/octree/build_subtrees.h"
 #include "backend/octree/builders.h"
 #include "backend/octree/collapse.h"
 #include "backend/octree/reinsert.h"
+#include "backend/octree/top_tree.h"
 
 namespace octrace::octree {
 
 namespace {
 
 // Measured on bunny, sponza, terrain and soup: docs/performance.md.
-BinaryOptions binary_options(bool quality) {
+BinaryOptions quality_options() {
   BinaryOptions options;
-  options.bins = quality ? 32 : 16;
-  // Only quality cuts triangles: looking for cuts takes most of a build's time.
-  options.spatial_bins = quality ? 32 : 0;
-  options.duplicates = quality ? 0.5f : 0.0f;
-  options.least_overlap = quality ? 3e-3f : 1e-3f;
+  options.bins = 32;
+  options.spatial_bins = 32;
+  options.duplicates = 0.5f;
+  options.least_overlap = 3e-3f;
   options.least_own_overlap = 0.1f;
   return options;
 }
+
+// The part of the root's surface that two sides of a split at the top share, above which
+// re-insertion is tried, which needs the whole binary tree.
+constexpr float kWorthMoving = 0.02f;
 
 // Share of triangles from which a tree counts as one with cuts.
 constexpr double kManyCuts = 0.01;
@@ -36,31 +41,59 @@ ReinsertOptions reinsert_options(bool quality) {
   return options;
 }
 
+// References and their leaf triangles share one memory; each triangle has one of either.
+LooseReference* references_of(Octree& octree, std::size_t triangles) {
+  octree.triangles.resize(triangles);
+  return reinterpret_cast<LooseReference*>(octree.triangles.data());
+}
+
+// False: too deep.
+bool build_fast(const BuildInput& input, std::uint32_t leaf_triangles, Octree& octree) {
+  const TopOptions options;
+  LooseReference* const references = references_of(octree, input.triangles.size());
+  const TopTree top = split_top(input, options, references);
+  if (getenv("OV")) fprintf(stderr, "overlap %g subtrees %zu\n", top.overlap, top.subtrees.size());
+  if (top.subtrees.size() > 1 && top.overlap <= kWorthMoving && !getenv("WHOLE")) {
+    return build_subtrees(top, options, leaf_triangles, input, references, octree);
+  }
+  BinaryTree tree = build_below(top, options, references);
+  reinsert(tree, reinsert_options(false));
+  return collapse(tree, leaf_triangles, input, octree);
+}
+
+bool build_quality(const BuildInput& input, std::uint32_t leaf_triangles, Octree& octree) {
+  BinaryTree tree = build_binary(input, quality_options());
+  reinsert(tree, reinsert_options(true));
+  if (!collapse(tree, leaf_triangles, input, octree)) return false;
+  octree.cut = octree.triangles.size() > input.triangles.size() * (1.0 + kManyCuts);
+  return true;
+}
+
 }  // namespace
 
 void build_sah(const BuildInput& input, std::uint32_t leaf_triangles, bool quality,
                Octree& octree) {
   if (input.triangles.empty()) return;
-  {
-    BinaryTree tree = build_binary(input, binary_options(quality));
-    reinsert(tree, reinsert_options(quality));
-    if (collapse(tree, leaf_triangles, input, octree)) {
-      octree.cut = octree.triangles.size() > input.triangles.size() * (1.0 + kManyCuts);
-      return;
-    }
-  }
+  if ((quality ? build_quality : build_fast)(input, leaf_triangles, octree)) return;
   // Too deep: halves by rank need at most 32 binary levels, so fewer eight-way ones.
-  BinaryOptions plain;
+  TopOptions plain;
   plain.sah_depth = 0;
-  BinaryTree tree = build_binary(input, plain);
+  LooseReference* const references = references_of(octree, input.triangles.size());
+  const TopTree top = split_top(input, plain, references);
+  BinaryTree tree = build_below(top, plain, references);
   collapse(tree, leaf_triangles, input, octree);
 }
 
 std::uint64_t sah_build_bytes(std::uint64_t triangles, bool quality) {
-  const double references =
-      static_cast<double>(triangles) * (1.0 + double{binary_options(quality).duplicates});
-  constexpr double kReferences = 2 * sizeof(Reference), kNodes = 2 * sizeof(BinaryNode);
-  return static_cast<std::uint64_t>(references * (kReferences + kNodes));
+  constexpr double kTree = 2 * sizeof(BinaryNode), kNodes = sizeof(kernels::Node) / 8.0;
+  const auto count = static_cast<double>(triangles);
+  if (!quality) {
+    // Where re-insertion is tried; else nodes are held twice in place of the binary tree.
+    return static_cast<std::uint64_t>(count * (sizeof(LooseReference) + kTree + kNodes));
+  }
+  constexpr double kReferences = 2 * sizeof(Reference);
+  const double references = count * (1.0 + double{quality_options().duplicates});
+  return static_cast<std::uint64_t>(references * (kReferences + kTree));
 }
 
 }  // namespace octrace::octree

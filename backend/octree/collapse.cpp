@@ -1,19 +1,13 @@
 #include "backend/octree/collapse.h"
 
 #include <tbb/parallel_for.h>
-#include <tbb/parallel_invoke.h>
 
 #include <algorithm>
 #include <array>
-#include <atomic>
-#include <bit>
-#include <limits>
 #include <memory>
 
-#include "backend/octree/leaf_triangle.h"
+#include "backend/octree/node_writer.h"
 #include "backend/octree/plan.h"
-#include "backend/octree/tree.h"
-#include "backend/util/huge_pages.h"
 
 namespace octrace::octree {
 
@@ -22,32 +16,6 @@ namespace {
 using kernels::kChildren;
 
 constexpr std::uint32_t kParallel = 4096;  // references worth a task
-
-// The children of an eight-way node, as binary nodes.
-struct Family {
-  std::array<std::uint32_t, kChildren> index;
-  int count = 0;
-
-  Family(const BinaryNode* nodes, std::uint32_t root) {
-    if (nodes[root].leaf()) {
-      index[count++] = root;
-    } else {
-      share_out(nodes, root, kChildren, true);
-    }
-  }
-
- private:
-  void share_out(const BinaryNode* nodes, std::uint32_t root, int slots, bool divided) {
-    const BinaryNode& node = nodes[root];
-    const int first = slots == 1 || node.leaf() ? 0 : first_slots(node.plan, slots);
-    if (!divided && first == 0) {
-      index[count++] = root;
-      return;
-    }
-    share_out(nodes, 2 * node.child, first, false);
-    share_out(nodes, 2 * node.child + 1, slots - first, false);
-  }
-};
 
 struct Size {
   std::uint32_t nodes = 0, triangles = 0;
@@ -67,21 +35,24 @@ struct Plot {
 class Writer {
  public:
   Writer(const BinaryTree& tree, const BuildInput& input, Octree& octree)
-      : nodes_(tree.nodes.get()), input_(input), octree_(octree) {}
+      : nodes_(tree.nodes.data()), input_(input), octree_(octree) {}
 
   bool run() {
     const std::unique_ptr<Plot> root = survey(BinaryTree::kRoot, 1);
     if (root->size.height > kernels::kMaxDepth) return false;
-    util::resize_in_huge_pages(octree_.nodes, root->size.nodes);
-    util::resize_in_huge_pages(octree_.triangles, root->size.triangles);
-    write(*root, 0, {1, 0});
+    octree_.nodes.resize(root->size.nodes);
+    octree_.triangles.resize(root->size.triangles);
+    const NodeWriter writer(nodes_, input_, octree_.nodes.data(), octree_.triangles.data());
+    write(writer, *root, 0, {1, 0});
     return true;
   }
 
  private:
   static constexpr int kTooHigh = kernels::kMaxDepth + 1;
 
-  bool leaf(std::uint32_t index) const { return (nodes_[index].plan & kLeafPlan) != 0; }
+  using Place = NodeWriter::Place;
+
+  bool leaf(std::uint32_t index) const { return is_leaf(nodes_[index]); }
 
   std::uint32_t leaf_size(std::uint32_t index) const {
     const BinaryNode& node = nodes_[index];
@@ -129,16 +100,11 @@ class Writer {
     return plot;
   }
 
-  // Where the next nodes and triangles go.
-  struct Place {
-    std::uint32_t node, triangle;
-  };
-
   // Depth first: a node's inner children side by side, in the order of slots, and after them what
   // is below each.
-  void write(const Plot& plot, std::uint32_t index, Place place) {
+  void write(const NodeWriter& writer, const Plot& plot, std::uint32_t index, Place place) {
     std::array<std::uint8_t, kChildren> order;
-    const int inner = write_node(plot.family, index, place, order);
+    const int inner = writer.write(plot.family, index, place, order);
     std::uint32_t child = octree_.nodes[index].first_child;
     struct Job {
       int of;
@@ -154,102 +120,12 @@ class Writer {
     tbb::parallel_for(0, inner, [&](int i) {
       const Job& job = jobs[i];
       if (plot.plots[job.of] != nullptr) {
-        write(*plot.plots[job.of], job.index, job.place);
+        write(writer, *plot.plots[job.of], job.index, job.place);
       } else {
         Place own = job.place;
-        write_small(plot.family.index[job.of], job.index, own);
+        writer.write_all(plot.family.index[job.of], job.index, own);
       }
     });
-  }
-
-  void write_small(std::uint32_t root, std::uint32_t index, Place& place) {
-    const Family family(nodes_, root);
-    std::array<std::uint8_t, kChildren> order;
-    const int inner = write_node(family, index, place, order);
-    const std::uint32_t child = octree_.nodes[index].first_child;
-    for (int i = 0; i < inner; ++i) {
-      write_small(family.index[order[i]], child + static_cast<std::uint32_t>(i), place);
-    }
-  }
-
-  // Writes the node and its leaves' triangles, and leaves room for its inner children, whose places
-  // in the family `order` gets. Returns how many they are.
-  int write_node(const Family& family, std::uint32_t index, Place& place,
-                 std::array<std::uint8_t, kChildren>& order) {
-    std::array<Child, kChildren> children;
-    Box bounds;
-    for (int i = 0; i < family.count; ++i) {
-      const BinaryNode& node = nodes_[family.index[i]];
-      Box& box = children[i].box;
-      box.lower = Float4{node.lower[0], node.lower[1], node.lower[2], 0.0f};
-      box.upper = Float4{node.upper[0], node.upper[1], node.upper[2], 0.0f};
-      bounds.add(box);
-    }
-    const std::span<const Child> used(children.data(), static_cast<std::size_t>(family.count));
-    const Slots slots = slots_by_octant(used, bounds);
-    kernels::Node& node = octree_.nodes[index];
-    node = {};
-    quantise(used, slots, node);
-    std::array<int, kChildren> at;  // by slot
-    at.fill(-1);
-    for (int i = 0; i < family.count; ++i) at[slots[i]] = i;
-    node.first_child = place.node;
-    node.first_triangle = place.triangle;
-    int inner = 0;
-    Leaves leaves;
-    for (unsigned slot = 0; slot < kChildren; ++slot) {
-      const int i = at[slot];
-      if (i < 0) continue;
-      if (leaf(family.index[i])) {
-        const std::uint32_t offset = leaves.count;
-        gather(family.index[i], leaves);
-        const std::uint32_t count = leaves.count - offset;
-        node.meta[slot] = static_cast<std::uint8_t>(((1u << count) - 1u) << 5 | offset);
-      } else {
-        node.inner_mask |= static_cast<std::uint8_t>(1u << slot);
-        node.meta[slot] = static_cast<std::uint8_t>(0x20u | (24u + slot));
-        order[inner++] = static_cast<std::uint8_t>(i);
-      }
-    }
-    write_triangles(leaves, place.triangle);
-    place.triangle += leaves.count;
-    place.node += static_cast<std::uint32_t>(inner);
-    return inner;
-  }
-
-  struct Leaves {
-    std::array<std::uint32_t, kernels::kMaxNodeTriangles> triangles;
-    std::uint32_t count = 0;
-  };
-
-  void gather(std::uint32_t index, Leaves& leaves) const {
-    const BinaryNode& node = nodes_[index];
-    if (node.leaf()) {
-      leaves.triangles[leaves.count++] = node.triangle();
-      return;
-    }
-    gather(2 * node.child, leaves);
-    gather(2 * node.child + 1, leaves);
-  }
-
-  // Triangles that lie together in space may lie anywhere in the scene: all are asked for before
-  // the first is used.
-  void write_triangles(const Leaves& leaves, std::uint32_t place) {
-    for (std::uint32_t i = 0; i < leaves.count; ++i) {
-      __builtin_prefetch(&input_.triangles[leaves.triangles[i]]);
-      if (!input_.triangle_geometry.empty()) {
-        __builtin_prefetch(&input_.triangle_geometry[leaves.triangles[i]]);
-      }
-    }
-    for (std::uint32_t i = 0; i < leaves.count; ++i) {
-      const kernels::Triangle& triangle = input_.triangles[leaves.triangles[i]];
-      for (const std::uint32_t corner : {triangle.a, triangle.b, triangle.c}) {
-        __builtin_prefetch(&input_.positions[corner]);
-      }
-    }
-    for (std::uint32_t i = 0; i < leaves.count; ++i) {
-      octree_.triangles[place + i] = leaf_triangle(input_, leaves.triangles[i]);
-    }
   }
 
   const BinaryNode* nodes_;
@@ -261,7 +137,7 @@ class Writer {
 
 bool collapse(BinaryTree& tree, std::uint32_t leaf_triangles, const BuildInput& input,
               Octree& octree) {
-  return plan(tree, leaf_triangles) && Writer(tree, input, octree).run();
+  return plan(tree.nodes.data(), leaf_triangles) && Writer(tree, input, octree).run();
 }
 
 }  // namespace octrace::octree

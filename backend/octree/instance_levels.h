@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "backend/util/huge_vector.h"
 #include "backend/util/result.h"
 #include "kernels/instance.h"
 
@@ -21,11 +22,10 @@ struct BuildOptions;
 struct Octree;
 
 struct InstanceLevels {
-  std::vector<kernels::Node> top_nodes;
-  std::vector<kernels::LeafTriangle>
-      boxes;                         // of the top octree, as kernels::InstancedSceneView has
-  std::vector<kernels::Node> nodes;  // of all meshes' octrees
-  std::vector<kernels::LeafTriangle> triangles;
+  util::HugeVector<kernels::Node> top_nodes;
+  util::HugeVector<kernels::LeafTriangle> boxes;  // of the top octree, as InstancedSceneView has
+  util::HugeVector<kernels::Node> nodes;          // of all meshes' octrees
+  util::HugeVector<kernels::LeafTriangle> triangles;
   std::vector<kernels::MeshRoot> roots;            // by mesh
   std::shared_ptr<const scene::Scene> meshes;      // that the octrees were built for
   std::shared_ptr<const scene::Instancing> shown;  // and the instances

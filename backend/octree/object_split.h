@@ -2,6 +2,7 @@
 // construction of SAH-based bounding volume hierarchies"): SIMD loops chosen at run time.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 
 #include "backend/octree/binary_tree.h"
@@ -17,7 +18,7 @@ struct Binning {
   int bins;
 
   Binning(const Bounds8& bounds, int bin_count);
-  int bin(const Reference& reference, int axis) const;
+  int bin(float centre2, int axis) const;
 };
 
 struct alignas(32) ObjectBins {
@@ -48,7 +49,9 @@ struct Scatter {
 // Nodes of a subtree that one thread builds.
 struct SubtreeRange {
   Reference* references;
+  Reference* spare;  // room for as many
   std::uint32_t count;
+  Bounds8 bounds;
   BinaryNode* nodes;         // of the whole tree
   std::uint32_t first_pair;  // the subtree owns count - 1 pairs from here
   std::uint32_t root;        // where its root goes
@@ -71,7 +74,23 @@ struct ObjectSplitter {
 
 // Halves by rank along the longest axis of the centres; the triangle decides among equals. Returns
 // how many come first.
-std::uint32_t split_by_rank(Reference* references, std::uint32_t count, const Bounds8& bounds);
+template <class R>
+std::uint32_t split_by_rank(R* references, std::uint32_t count, const Bounds8& bounds) {
+  float extent[3];
+  for (int axis = 0; axis < 3; ++axis) {
+    extent[axis] = -bounds.centres[4 + axis] - bounds.centres[axis];
+  }
+  int axis = extent[1] > extent[0] ? 1 : 0;
+  if (extent[2] > extent[axis]) axis = 2;
+  const std::uint32_t half = count / 2;
+  // Parts of one triangle at the same place are alike in all that matters.
+  std::nth_element(references, references + half, references + count,
+                   [axis](const R& a, const R& b) {
+                     const float ca = a.centre2(axis), cb = b.centre2(axis);
+                     return ca < cb || (ca == cb && a.triangle < b.triangle);
+                   });
+  return half;
+}
 
 void write_node(BinaryNode& node, const Bounds8& bounds, std::uint32_t child, std::uint32_t count);
 

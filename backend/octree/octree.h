@@ -8,6 +8,7 @@
 
 #include "backend/octree/instance_levels.h"
 #include "backend/scene/scene.h"
+#include "backend/util/huge_vector.h"
 #include "backend/util/result.h"
 #include "kernels/node.h"
 
@@ -35,8 +36,8 @@ struct Statistics {
 };
 
 struct Octree {
-  std::vector<kernels::Node> nodes;
-  std::vector<kernels::LeafTriangle> triangles;
+  util::HugeVector<kernels::Node> nodes;
+  util::HugeVector<kernels::LeafTriangle> triangles;
   bool cut = false;          // more than a few triangles were cut and lie in several leaves
   InstanceLevels instances;  // empty where the scene has none
 

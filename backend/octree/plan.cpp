@@ -35,11 +35,14 @@ struct Costs {
 
 class Planner {
  public:
-  Planner(BinaryNode* nodes, std::uint32_t leaf) : nodes_(nodes), leaf_(leaf) {}
+  // `costs`: of the subtrees that leaves stand for; null: leaves are triangles.
+  Planner(BinaryNode* nodes, std::uint32_t leaf, const float* costs)
+      : nodes_(nodes), leaf_(leaf), costs_(costs) {}
 
-  HWY_ATTR bool run() {
+  HWY_ATTR bool run(float& cost) {
     Costs costs;
     plan(BinaryTree::kRoot, 0, costs);
+    cost = costs.word[8];
     return !too_deep_;
   }
 
@@ -53,6 +56,11 @@ class Planner {
       store(eight(node.half_area() * kTriangleCost), costs.word + 8);
       costs.references = 1;
       node.plan = kLeafPlan;
+      if (costs_ != nullptr && node.leaf()) {
+        store(eight(costs_[node.triangle()]), costs.word + 8);
+        costs.references = leaf_ + 1;
+        node.plan = 0;
+      }
       return;
     }
     const std::uint32_t first = 2 * node.child;
@@ -112,11 +120,13 @@ class Planner {
 
   BinaryNode* nodes_;
   const std::uint32_t leaf_;
+  const float* const costs_;
   std::atomic<bool> too_deep_{false};
 };
 
-HWY_ATTR bool plan_all(BinaryNode* nodes, std::uint32_t leaf_triangles) {
-  return Planner(nodes, leaf_triangles).run();
+HWY_ATTR bool plan_all(BinaryNode* nodes, std::uint32_t leaf_triangles, const float* costs,
+                       float& cost) {
+  return Planner(nodes, leaf_triangles, costs).run(cost);
 }
 
 }  // namespace octrace::octree::HWY_NAMESPACE
@@ -127,8 +137,20 @@ namespace octrace::octree {
 
 HWY_EXPORT(plan_all);
 
-bool plan(BinaryTree& tree, std::uint32_t leaf_triangles) {
-  return HWY_DYNAMIC_DISPATCH(plan_all)(tree.nodes.get(), leaf_triangles);
+bool plan(BinaryNode* nodes, std::uint32_t leaf_triangles) {
+  float cost;
+  return HWY_DYNAMIC_DISPATCH(plan_all)(nodes, leaf_triangles, nullptr, cost);
+}
+
+float plan_subtree(BinaryNode* nodes, std::uint32_t leaf_triangles) {
+  float cost;
+  HWY_DYNAMIC_DISPATCH(plan_all)(nodes, leaf_triangles, nullptr, cost);
+  return cost;
+}
+
+void plan_top(BinaryNode* nodes, const float* costs) {
+  float cost;
+  HWY_DYNAMIC_DISPATCH(plan_all)(nodes, 0, costs, cost);
 }
 
 }  // namespace octrace::octree

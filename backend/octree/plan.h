@@ -16,7 +16,14 @@ inline int first_slots(std::uint32_t plan, int slots) {
 }
 inline std::uint32_t about_count(std::uint32_t plan) { return 1u << (plan >> 27); }
 
-// Overwrites the nodes' plans. False: the tree is too deep to be of use.
-bool plan(BinaryTree& tree, std::uint32_t leaf_triangles);
+// In one slot, the subtree of a planned node is a leaf.
+inline bool is_leaf(const BinaryNode& node) { return (node.plan & kLeafPlan) != 0; }
+
+// Overwrites the plans of the tree whose root is nodes[kRoot]. False: it is too deep to be of use.
+bool plan(BinaryNode* nodes, std::uint32_t leaf_triangles);
+// The same for a small tree, which one thread takes. Returns its cost in one slot.
+float plan_subtree(BinaryNode* nodes, std::uint32_t leaf_triangles);
+// The same where leaf i stands for a subtree that takes one slot at cost costs[i].
+void plan_top(BinaryNode* nodes, const float* costs);
 
 }  // namespace octrace::octree

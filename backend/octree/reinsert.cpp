@@ -31,10 +31,10 @@ struct Move {
 class Reinserter {
  public:
   explicit Reinserter(BinaryTree& tree)
-      : nodes_(tree.nodes.get()),
-        parents_(std::make_unique_for_overwrite<Index[]>(tree.size)),
+      : nodes_(tree.nodes.data()),
+        parents_(std::make_unique_for_overwrite<Index[]>(tree.nodes.size())),
         references_(nodes_[kRoot].plan),
-        touched_(tree.size, false) {
+        touched_(tree.nodes.size(), false) {
     parents_[kRoot] = 0;
   }
 

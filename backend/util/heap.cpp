@@ -4,7 +4,7 @@
 
 #include <cstdlib>
 
-#include "backend/util/huge_pages.h"
+#include "backend/util/huge_memory.h"
 
 namespace octrace::util {
 

@@ -35,16 +35,18 @@ class CudaCalls {
   kernels::cuda::Status status_;
 };
 
-template <class T>
-kernels::cuda::Status upload(render::DeviceMemory& memory, const std::vector<T>& values) {
+template <class T, class Allocator>
+kernels::cuda::Status upload(render::DeviceMemory& memory,
+                             const std::vector<T, Allocator>& values) {
   if (values.empty()) return {};
   const std::uint64_t bytes = values.size() * sizeof(T);
   if (kernels::cuda::Status s = memory.reserve(bytes); !s.ok()) return s;
   return kernels::cuda::copy_to_device(memory.data(), values.data(), bytes, nullptr);
 }
 
-template <class T>
-kernels::Span<T> span_of(const render::DeviceMemory& memory, const std::vector<T>& values) {
+template <class T, class Allocator>
+kernels::Span<T> span_of(const render::DeviceMemory& memory,
+                         const std::vector<T, Allocator>& values) {
   return {static_cast<const T*>(memory.data()), values.size()};
 }
 
