@@ -25,6 +25,12 @@ struct alignas(32) Reference {
 };
 static_assert(sizeof(Reference) == 32);
 
+// What a leaf triangle is made of.
+struct alignas(16) Corners {
+  std::uint32_t a, b, c;  // positions
+  std::uint32_t geometry;
+};
+
 // A reference at the place of a leaf triangle: references without parts are kept in the memory of
 // the leaf triangles to come, which would lie idle while the tree is made, and each range of them
 // in that of its own triangles.
@@ -32,9 +38,8 @@ struct alignas(16) LooseReference {
   float lower[3];
   std::uint32_t triangle;
   float negated_upper[3];
-  std::uint32_t part;
   std::uint32_t note;  // for whoever splits
-  std::uint32_t unused[3];
+  Corners corners;
 
   float centre2(int axis) const { return lower[axis] - negated_upper[axis]; }
 };

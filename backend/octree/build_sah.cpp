@@ -52,8 +52,7 @@ bool build_fast(const BuildInput& input, std::uint32_t leaf_triangles, Octree& o
   const TopOptions options;
   LooseReference* const references = references_of(octree, input.triangles.size());
   const TopTree top = split_top(input, options, references);
-  if (getenv("OV")) fprintf(stderr, "overlap %g subtrees %zu\n", top.overlap, top.subtrees.size());
-  if (top.subtrees.size() > 1 && top.overlap <= kWorthMoving && !getenv("WHOLE")) {
+  if (top.subtrees.size() > 1 && top.overlap <= kWorthMoving) {
     return build_subtrees(top, options, leaf_triangles, input, references, octree);
   }
   BinaryTree tree = build_below(top, options, references);

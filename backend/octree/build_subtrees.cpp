@@ -1,7 +1,8 @@
-// Threads share nothing while they build subtrees: range [first, first + count) of the references is
-// replaced by the same range of leaf triangles, since each triangle lies in one leaf, and nodes wait
-// in the memory of their thread until all sizes are known. Then the top is planned and written, and
-// subtrees are copied to places that do not depend on threads: depth first, as all other trees.
+// Threads share nothing while they build subtrees: range [first, first + count) of the references
+// is replaced by the same range of leaf triangles, since each triangle lies in one leaf, and nodes
+// wait in the memory of their thread until all sizes are known. Then the top is planned and
+// written, and subtrees are copied to places that do not depend on threads: depth first, as all
+// other trees.
 #include "backend/octree/build_subtrees.h"
 
 #include <tbb/enumerable_thread_specific.h>
@@ -9,6 +10,7 @@
 
 #include <algorithm>
 
+#include "backend/octree/blocks.h"
 #include "backend/octree/node_writer.h"
 #include "backend/octree/plan.h"
 
@@ -27,40 +29,32 @@ struct Chunk {
 
 class Workplace {
  public:
-  Workplace() : nodes_(std::make_unique_for_overwrite<BinaryNode[]>(2 * kSubtree)) {}
+  Workplace()
+      : nodes_(std::make_unique_for_overwrite<BinaryNode[]>(2 * kSubtree)),
+        local_(std::make_unique_for_overwrite<LocalTriangle[]>(kSubtree)) {}
 
   // Returns the subtree's cost in one slot.
   float build(const TopRange& range, const TopOptions& options, std::uint32_t leaf_triangles,
               const BuildInput& input, const LooseReference* references,
               kernels::LeafTriangle* triangles, Chunk& chunk) {
-    room_.build(range, options, references, nodes_.get(), 1, BinaryTree::kRoot);
+    room_.build(range, options, references, nodes_.get(), local_.get());
     const float cost = plan_subtree(nodes_.get(), leaf_triangles);
     // Every node but a subtree's root has two children or more, so there are not more of them.
-    kernels::Node* const to = reserve(range.count);
+    kernels::Node* const to = written_.reserve(range.count);
     NodeWriter::Place place{1, range.first};
-    chunk.height = NodeWriter(nodes_.get(), input, to, triangles)
+    chunk.height = NodeWriter(nodes_.get(), input, local_.get(), to, triangles)
                        .write_all(BinaryTree::kRoot, 0, place);
     chunk.nodes = to;
     chunk.size = place.node;
-    free_ -= place.node;
+    written_.use(place.node);
     return cost;
   }
 
  private:
-  static constexpr std::uint32_t kBlock = 4 * kSubtree;
-
-  kernels::Node* reserve(std::uint32_t most) {
-    if (free_ < most) {
-      blocks_.push_back(std::make_unique_for_overwrite<kernels::Node[]>(kBlock));
-      free_ = kBlock;
-    }
-    return blocks_.back().get() + (kBlock - free_);
-  }
-
   SubtreeRoom room_;
   std::unique_ptr<BinaryNode[]> nodes_;
-  std::vector<std::unique_ptr<kernels::Node[]>> blocks_;
-  std::uint32_t free_ = 0;  // of the last block
+  std::unique_ptr<LocalTriangle[]> local_;
+  Blocks<kernels::Node, 4 * kSubtree> written_;
 };
 
 class TopWriter {
@@ -72,7 +66,7 @@ class TopWriter {
   bool run() {
     if (measure(BinaryTree::kRoot, 1) > kernels::kMaxDepth) return false;
     octree_.nodes.resize(sizes_[BinaryTree::kRoot]);
-    const NodeWriter writer(nodes_.data(), input_, octree_.nodes.data(), nullptr);
+    const NodeWriter writer(nodes_.data(), input_, octree_.nodes.data(), octree_.triangles.data());
     write(writer, BinaryTree::kRoot, 0, 1);
     tbb::parallel_for(std::size_t{0}, jobs_.size(), [&](std::size_t i) { copy(jobs_[i]); });
     return true;
@@ -120,11 +114,7 @@ class TopWriter {
 
   void copy(const Job& job) {
     const Chunk& chunk = chunks_[job.subtree];
-    kernels::Node* const nodes = octree_.nodes.data();
-    nodes[job.root] = chunk.nodes[0];
-    std::copy_n(chunk.nodes + 1, chunk.size - 1, nodes + job.below);
-    nodes[job.root].first_child += job.below - 1;
-    for (std::uint32_t i = 0; i + 1 < chunk.size; ++i) nodes[job.below + i].first_child += job.below - 1;
+    copy_subtree(chunk.nodes, chunk.size, octree_.nodes.data(), job.root, {job.below, 0});
   }
 
   const std::vector<BinaryNode>& nodes_;

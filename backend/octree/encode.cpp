@@ -133,14 +133,33 @@ HWY_ATTR HWY_INLINE void steps(const double* values, double origin, double scale
   for (int i = 0; i < kChildren; ++i) steps[i] = static_cast<std::uint8_t>(whole[i]);
 }
 
+// As std::ldexp(1.0, exponent), which is a call, for exponents of normal numbers.
+HWY_INLINE double power_of_two(int exponent) {
+  return std::bit_cast<double>(static_cast<std::uint64_t>(1023 + exponent) << 52);
+}
+
+// As kernels::exponent_for() of floats, without calls: extents of floats are normal as doubles.
+HWY_INLINE std::int8_t exponent_of(double origin, double end) {
+  const double extent = end - origin;
+  if (!(extent > 0.0)) return kernels::kMinExponent;
+  if (!(extent < std::numeric_limits<double>::infinity()))
+    return kernels::exponent_for(origin, end);
+  int exponent = static_cast<int>(std::bit_cast<std::uint64_t>(extent / 255.0) >> 52) - 1022;
+  exponent = std::max(exponent, kernels::kMinExponent);
+  if (exponent > kernels::kMinExponent && origin + 255.0 * power_of_two(exponent - 1) >= end) {
+    --exponent;
+  }
+  return static_cast<std::int8_t>(exponent);
+}
+
 HWY_ATTR void quantise_boxes(const Child* children, std::size_t count, const Slots& slots_of,
                              kernels::Node& node) {
   Box bounds;
   for (std::size_t c = 0; c < count; ++c) bounds.add(children[c].box);
   for (int axis = 0; axis < 3; ++axis) {
     node.origin[axis] = bounds.lower[axis];
-    node.exponent[axis] = kernels::exponent_for(bounds.lower[axis], bounds.upper[axis]);
-    const double scale = std::ldexp(1.0, node.exponent[axis]);
+    node.exponent[axis] = exponent_of(bounds.lower[axis], bounds.upper[axis]);
+    const double scale = power_of_two(node.exponent[axis]);
     alignas(64) double lower[kChildren], upper[kChildren];  // by slot; the origin where unused
     std::fill_n(lower, kChildren, double{bounds.lower[axis]});
     std::fill_n(upper, kChildren, double{bounds.lower[axis]});

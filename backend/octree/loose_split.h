@@ -11,8 +11,8 @@ struct LooseSplitter {
   Bounds8 (*bounds)(const LooseReference*, std::uint32_t count);
   void (*fill)(const LooseReference*, std::uint32_t count, const Binning&, ObjectBins&);
   // Which of some references on one side of a range belong to the other: the note of the i-th
-  // reference becomes the place of the i-th such one. Returns how many there are; adds to the bounds
-  // of the lower and the upper side what belongs there.
+  // reference becomes the place of the i-th such one. Returns how many there are; adds to the
+  // bounds of the lower and the upper side what belongs there.
   std::uint32_t (*find_misplaced)(LooseReference*, std::uint32_t count, bool on_upper_side,
                                   const Binning&, const ObjectSplit&, Bounds8 (&bounds)[2]);
   void (*pack)(const LooseReference*, std::uint32_t count, Reference* to);

@@ -68,7 +68,13 @@ int NodeWriter::write(const Family& family, std::uint32_t index, Place& place,
       order[inner++] = static_cast<std::uint8_t>(i);
     }
   }
-  write_triangles(leaves, place.triangle);
+  if (local_ != nullptr) {
+    write_local(leaves, place.triangle);
+  } else if (names_ != nullptr) {
+    std::copy_n(leaves.triangles.begin(), leaves.count, names_ + place.triangle);
+  } else {
+    write_triangles(input_, leaves.triangles.data(), leaves.count, triangles_ + place.triangle);
+  }
   place.triangle += leaves.count;
   place.node += static_cast<std::uint32_t>(inner);
   return inner;
@@ -81,8 +87,8 @@ int NodeWriter::write_all(std::uint32_t root, std::uint32_t index, Place& place)
   const std::uint32_t child = to_[index].first_child;
   int below = 0;
   for (int i = 0; i < inner; ++i) {
-    below = std::max(below, write_all(family.index[order[i]], child + static_cast<std::uint32_t>(i),
-                                      place));
+    below = std::max(
+        below, write_all(family.index[order[i]], child + static_cast<std::uint32_t>(i), place));
   }
   return 1 + below;
 }
@@ -97,24 +103,61 @@ void NodeWriter::gather(std::uint32_t index, Leaves& leaves) const {
   gather(2 * node.child + 1, leaves);
 }
 
-// Triangles that lie together in space may lie anywhere in the scene: all are asked for before
-// the first is used.
-void NodeWriter::write_triangles(const Leaves& leaves, std::uint32_t place) const {
+// Corners that lie together in space may lie anywhere in the scene: all are asked for before the
+// first is used.
+void NodeWriter::write_local(const Leaves& leaves, std::uint32_t place) const {
   for (std::uint32_t i = 0; i < leaves.count; ++i) {
-    __builtin_prefetch(&input_.triangles[leaves.triangles[i]]);
-    if (!input_.triangle_geometry.empty()) {
-      __builtin_prefetch(&input_.triangle_geometry[leaves.triangles[i]]);
-    }
-  }
-  for (std::uint32_t i = 0; i < leaves.count; ++i) {
-    const kernels::Triangle& triangle = input_.triangles[leaves.triangles[i]];
-    for (const std::uint32_t corner : {triangle.a, triangle.b, triangle.c}) {
+    const Corners& corners = local_[leaves.triangles[i]].corners;
+    for (const std::uint32_t corner : {corners.a, corners.b, corners.c}) {
       __builtin_prefetch(&input_.positions[corner]);
     }
   }
   for (std::uint32_t i = 0; i < leaves.count; ++i) {
-    std::construct_at(triangles_ + place + i, leaf_triangle(input_, leaves.triangles[i]));
+    const LocalTriangle& local = local_[leaves.triangles[i]];
+    const Corners& corners = local.corners;
+    const std::uint32_t flags = input_.flags.empty() ? 0 : input_.flags[corners.geometry];
+    std::construct_at(triangles_ + place + i,
+                      kernels::LeafTriangle{input_.positions[corners.a], local.triangle,
+                                            input_.positions[corners.b], flags,
+                                            input_.positions[corners.c], corners.geometry});
   }
+}
+
+// Triangles that lie together in space may lie anywhere in the scene: those to come are asked for
+// early, their corners when they are there.
+void write_triangles(const BuildInput& input, const std::uint32_t* names, std::uint32_t count,
+                     kernels::LeafTriangle* to) {
+  constexpr std::uint32_t kAhead = 8;
+  const auto ask = [&](std::uint32_t i) {
+    if (i >= count) return;
+    __builtin_prefetch(&input.triangles[names[i]]);
+    if (!input.triangle_geometry.empty()) __builtin_prefetch(&input.triangle_geometry[names[i]]);
+  };
+  const auto ask_for_corners = [&](std::uint32_t i) {
+    if (i >= count) return;
+    const kernels::Triangle& triangle = input.triangles[names[i]];
+    for (const std::uint32_t corner : {triangle.a, triangle.b, triangle.c}) {
+      __builtin_prefetch(&input.positions[corner]);
+    }
+  };
+  for (std::uint32_t i = 0; i < 2 * kAhead; ++i) ask(i);
+  for (std::uint32_t i = 0; i < kAhead; ++i) ask_for_corners(i);
+  for (std::uint32_t i = 0; i < count; ++i) {
+    ask(i + 2 * kAhead);
+    ask_for_corners(i + kAhead);
+    std::construct_at(to + i, leaf_triangle(input, names[i]));
+  }
+}
+
+void copy_subtree(const kernels::Node* from, std::uint32_t size, kernels::Node* nodes,
+                  std::uint32_t root, const NodeWriter::Place& place) {
+  const auto move = [&](const kernels::Node& node, kernels::Node& to) {
+    to = node;
+    to.first_child += place.node - 1;
+    to.first_triangle += place.triangle;
+  };
+  move(from[0], nodes[root]);
+  for (std::uint32_t i = 1; i < size; ++i) move(from[i], nodes[place.node + i - 1]);
 }
 
 }  // namespace octrace::octree

@@ -4,7 +4,7 @@
 #include <array>
 #include <cstdint>
 
-#include "backend/octree/binary_tree.h"
+#include "backend/octree/top_tree.h"
 
 namespace octrace::octree {
 
@@ -26,9 +26,18 @@ class NodeWriter {
     std::uint32_t node, triangle;
   };
 
+  // The tree's leaves name the scene's triangles.
   NodeWriter(const BinaryNode* nodes, const BuildInput& input, kernels::Node* to,
              kernels::LeafTriangle* triangles)
       : nodes_(nodes), input_(input), to_(to), triangles_(triangles) {}
+  // The same, but the triangles' names alone are written.
+  NodeWriter(const BinaryNode* nodes, const BuildInput& input, kernels::Node* to,
+             std::uint32_t* names)
+      : nodes_(nodes), input_(input), to_(to), names_(names) {}
+  // They name elements of `local`.
+  NodeWriter(const BinaryNode* nodes, const BuildInput& input, const LocalTriangle* local,
+             kernels::Node* to, kernels::LeafTriangle* triangles)
+      : nodes_(nodes), input_(input), local_(local), to_(to), triangles_(triangles) {}
 
   // Writes the node and its leaves' triangles, and leaves room for its inner children, whose places
   // in the family `order` gets. Returns how many they are.
@@ -46,12 +55,23 @@ class NodeWriter {
   };
 
   void gather(std::uint32_t index, Leaves& leaves) const;
-  void write_triangles(const Leaves& leaves, std::uint32_t place) const;
+  void write_local(const Leaves& leaves, std::uint32_t place) const;
 
   const BinaryNode* nodes_;
   const BuildInput& input_;
+  const LocalTriangle* local_ = nullptr;
   kernels::Node* to_;
-  kernels::LeafTriangle* triangles_;
+  kernels::LeafTriangle* triangles_ = nullptr;
+  std::uint32_t* names_ = nullptr;
 };
+
+// Writes the leaf triangles of the scene's triangles that are named.
+void write_triangles(const BuildInput& input, const std::uint32_t* names, std::uint32_t count,
+                     kernels::LeafTriangle* to);
+
+// Moves a subtree, whose root is `from` and whose other nodes follow in places 1 to size - 1, among
+// other nodes: its root to nodes[root], all below to `place`.
+void copy_subtree(const kernels::Node* from, std::uint32_t size, kernels::Node* nodes,
+                  std::uint32_t root, const NodeWriter::Place& place);
 
 }  // namespace octrace::octree

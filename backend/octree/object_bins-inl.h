@@ -15,11 +15,22 @@
 HWY_BEFORE_NAMESPACE();
 namespace octrace::octree::HWY_NAMESPACE {
 
+// As ObjectBins::clear().
+HWY_ATTR HWY_INLINE void clear(ObjectBins& bins, int count) {
+  const hn::RebindToUnsigned<decltype(kTag)> du;
+  for (int axis = 0; axis < 3; ++axis) {
+    for (int bin = 0; bin < count; ++bin) store(infinities(), bins.boxes[axis][bin]);
+    for (int bin = 0; bin < count; bin += static_cast<int>(kLanes)) {
+      hn::Store(hn::Zero(du), du, bins.counts[axis] + bin);
+    }
+  }
+}
+
 // The bins of a few references first and then the boxes, so that the processor knows all addresses
 // by the time it loads from them: references of one bin often follow each other.
 template <class R>
-HWY_ATTR HWY_INLINE void fill_bins(const R* references, std::uint32_t count,
-                                   const Binning& binning, ObjectBins& bins) {
+HWY_ATTR HWY_INLINE void fill_bins(const R* references, std::uint32_t count, const Binning& binning,
+                                   ObjectBins& bins) {
   constexpr std::uint32_t kFew = 32;
   alignas(16) std::int32_t bin[kFew][4];
 #if HWY_TARGET != HWY_SCALAR

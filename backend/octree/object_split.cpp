@@ -103,8 +103,8 @@ class Subtree {
                                int depth, Bounds8& lower, Bounds8& upper) {
     if (depth < range_.sah_depth) {
       // Few bins tell few references apart.
-      const Binning binning(bounds, count <= 32 ? 8 : range_.bins);
-      bins_.clear(binning.bins);
+      const Binning binning(bounds, count <= kFew ? 8 : range_.bins);
+      clear(bins_, binning.bins);
       fill_bins(references, count, binning, bins_);
       const ObjectSplit chosen = best_split(bins_, binning.bins);
       if (chosen.axis >= 0) return partition(references, count, binning, chosen, lower, upper);
@@ -138,6 +138,8 @@ class Subtree {
     return lower;
   }
 
+  static constexpr std::uint32_t kFew = 96;
+
   const SubtreeRange& range_;
   ObjectBins bins_;
 };
@@ -166,17 +168,6 @@ ObjectSplitter::ObjectSplitter() {
   count_lower = HWY_DISPATCH_TABLE(count_lower)[index];
   scatter = HWY_DISPATCH_TABLE(scatter)[index];
   subtree = HWY_DISPATCH_TABLE(subtree)[index];
-}
-
-Binning::Binning(const Bounds8& bounds, int bin_count) : bins(bin_count) {
-  for (int axis = 0; axis < 3; ++axis) {
-    lower[axis] = bounds.centres[axis];
-    const float extent = -bounds.centres[4 + axis] - lower[axis];
-    scale[axis] = extent > 0.0f ? static_cast<float>(bins) * 0.9999f / extent : 0.0f;
-    // A denormal extent overflows the quotient; such an axis cannot be told apart.
-    if (!(scale[axis] < std::numeric_limits<float>::max())) scale[axis] = 0.0f;
-  }
-  lower[3] = scale[3] = 0.0f;
 }
 
 int Binning::bin(float centre2, int axis) const {

@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <limits>
 
 #include "backend/octree/binary_tree.h"
+#include "backend/octree/box.h"
 
 namespace octrace::octree {
 
@@ -17,7 +19,20 @@ struct Binning {
   float scale[4];  // 0 along axes whose centres cannot be told apart
   int bins;
 
-  Binning(const Bounds8& bounds, int bin_count);
+  Binning(const Bounds8& bounds, int bin_count) : bins(bin_count) {
+    const auto* const centres = reinterpret_cast<const Float4*>(bounds.centres);
+    const Float4 low = centres[0], extent = -centres[1] - low;
+    const Float4 most = Float4{} + std::numeric_limits<float>::max();
+    const Float4 quotient = static_cast<float>(bins) * 0.9999f / extent;
+    // A denormal extent overflows the quotient; such an axis cannot be told apart.
+    const auto use = (extent > 0.0f) & (quotient < most);
+    const Float4 scales = use ? quotient : Float4{};
+    for (int axis = 0; axis < 3; ++axis) {
+      lower[axis] = low[axis];
+      scale[axis] = scales[axis];
+    }
+    lower[3] = scale[3] = 0.0f;
+  }
   int bin(float centre2, int axis) const;
 };
 

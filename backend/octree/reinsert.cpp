@@ -2,7 +2,6 @@
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
-#include <tbb/parallel_invoke.h>
 
 #include <algorithm>
 #include <vector>
@@ -13,7 +12,6 @@ namespace {
 
 using Index = std::uint32_t;
 constexpr Index kRoot = BinaryTree::kRoot;
-constexpr std::uint32_t kParallel = 4096;  // references worth a task
 
 float joined_half_area(const BinaryNode& a, const BinaryNode& b) {
   float extent[3];
@@ -26,6 +24,7 @@ float joined_half_area(const BinaryNode& a, const BinaryNode& b) {
 struct Move {
   Index from = 0, to = 0;
   float gain = 0.0f;
+  std::vector<Index> path;  // from the sibling of a node whose parent is known down to `to`
 };
 
 class Reinserter {
@@ -59,19 +58,20 @@ class Reinserter {
     std::vector<Move> moves(candidates.size());
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, candidates.size(), 16),
                       [&](const auto& range) {
-                        std::vector<Step> stack;
+                        Search search;
                         for (std::size_t i = range.begin(); i < range.end(); ++i) {
-                          moves[i] = find(candidates[i], stack);
+                          moves[i] = find(candidates[i], search);
                         }
                       });
     std::erase_if(moves, [](const Move& move) { return move.gain <= 0.0f; });
     float gain = 0.0f;
     for (const Move& move : moves) gain += move.gain;
-    if (!linked_) {  // searching needs the parents of large nodes alone
+    if (!worth_it_) {
       if (!(gain > options.least_gain * nodes_[kRoot].half_area())) return 0.0f;
-      link(kRoot);
-      linked_ = true;
+      worth_it_ = true;
     }
+    // Before anything moves: the searches saw this tree.
+    for (const Move& move : moves) link(move);
     std::sort(moves.begin(), moves.end(), [](const Move& a, const Move& b) {
       return a.gain > b.gain || (a.gain == b.gain && a.from < b.from);
     });
@@ -102,16 +102,13 @@ class Reinserter {
     return sum;
   }
 
-  void link(Index index) {
-    const BinaryNode& node = nodes_[index];
-    if (node.leaf()) return;
-    const Index first = 2 * node.child;
-    parents_[first] = parents_[first + 1] = index;
-    if (node.plan > kParallel) {
-      tbb::parallel_invoke([&] { link(first); }, [&] { link(first + 1); });
-    } else {
-      link(first);
-      link(first + 1);
+  // Only the parents of nodes that were looked at and of those on the way to a move's target, with
+  // their siblings, are ever asked for: most nodes of a tree are neither.
+  void link(const Move& move) {
+    Index parent = parents_[move.path[0] ^ 1u];
+    for (const Index index : move.path) {
+      parents_[index] = parents_[index ^ 1u] = parent;
+      parent = index;
     }
   }
 
@@ -142,34 +139,46 @@ class Reinserter {
   struct Step {
     float gain;
     Index index;
+    Index above;  // the step to the parent, in `seen`; kNone: none
+  };
+  struct Search {
+    std::vector<Step> stack;
+    std::vector<Step> seen;
   };
 
   // Branch and bound from the node's sibling up to the root and down each way.
-  Move find(Index from, std::vector<Step>& stack) const {
+  Move find(Index from, Search& search) const {
+    std::vector<Step>& stack = search.stack;
+    std::vector<Step>& seen = search.seen;
+    seen.clear();
     const BinaryNode& node = nodes_[from];
     const float area = node.half_area();
     const Index parent = parents_[from];
-    Move best{from, 0, 0.0f};
+    Move best{from, 0, 0.0f, {}};
+    Index best_step = kernels::kNone;
     float gain_here = nodes_[parent].half_area();
     Index sibling = from ^ 1u, pivot = parent;
     BinaryNode without = nodes_[sibling];  // the pivot's box without the node
     for (;;) {
-      stack.push_back({gain_here, sibling});
+      stack.push_back({gain_here, sibling, kernels::kNone});
       while (!stack.empty()) {
         const Step step = stack.back();
         stack.pop_back();
         if (step.gain - area <= best.gain) continue;
+        const auto here = static_cast<Index>(seen.size());
+        seen.push_back(step);
         const BinaryNode& to = nodes_[step.index];
         const float gain = step.gain - joined_half_area(to, node);
         if (gain > best.gain) {
           best.to = step.index;
           best.gain = gain;
+          best_step = here;
         }
         if (to.leaf()) continue;
         const float below = gain + to.half_area();
         if (below - area <= best.gain) continue;
-        stack.push_back({below, 2 * to.child});
-        stack.push_back({below, 2 * to.child + 1});
+        stack.push_back({below, 2 * to.child, here});
+        stack.push_back({below, 2 * to.child + 1, here});
       }
       if (pivot != parent) {
         const BinaryNode& other = nodes_[sibling];
@@ -184,6 +193,10 @@ class Reinserter {
       pivot = parents_[pivot];
     }
     if (best.to == (from ^ 1u) || best.to == parent) return {};
+    for (Index i = best_step; i != kernels::kNone; i = seen[i].above) {
+      best.path.push_back(seen[i].index);
+    }
+    std::reverse(best.path.begin(), best.path.end());
     return best;
   }
 
@@ -226,7 +239,7 @@ class Reinserter {
   BinaryNode* nodes_;
   std::unique_ptr<Index[]> parents_;
   std::uint32_t references_;
-  bool linked_ = false;        // all parents are known
+  bool worth_it_ = false;      // the first round gained enough
   std::vector<bool> touched_;  // by moves of this round
   std::vector<Index> touched_list_;
 };

@@ -102,10 +102,8 @@ void exchange(const Half& lower, const Half& upper) {
       while (number >= upper.first_number(other + 1)) ++other;
       LooseReference& a = lower.in_block(block, number - first);
       LooseReference& b = upper.in_block(other, number - upper.first_number(other));
-      Reference held;
-      std::memcpy(&held, &a, sizeof(Reference));
-      std::memcpy(&a, &b, sizeof(Reference));
-      std::memcpy(&b, &held, sizeof(Reference));
+      std::swap(a, b);
+      std::swap(a.note, b.note);
     }
   };
   if (lower.blocks() * kBlock <= kParallel) {
@@ -144,8 +142,11 @@ class TopSplitter {
     return all;
   }
   Bounds8 make_references(std::uint32_t first, std::uint32_t count) {
+    const std::uint32_t* const geometries =
+        input_.triangle_geometry.empty() ? nullptr : input_.triangle_geometry.data();
     Box box, centres;
     for (std::uint32_t i = first; i < first + count; ++i) {
+      const kernels::Triangle& t = input_.triangles[i];
       const Box own = triangle_box(input_, i);
       box.add(own);
       centres.add(own.centre2());
@@ -154,8 +155,7 @@ class TopSplitter {
                                        i,
                                        {-own.upper[0], -own.upper[1], -own.upper[2]},
                                        0,
-                                       0,
-                                       {}});
+                                       {t.a, t.b, t.c, geometries ? geometries[i] : 0}});
     }
     Bounds8 bounds;
     for (int axis = 0; axis < 3; ++axis) {
@@ -172,7 +172,8 @@ class TopSplitter {
   static float lateral_overlap(const Bounds8& lower, const Bounds8& upper, int axis) {
     float shared[3];
     for (int i = 0; i < 3; ++i) {
-      shared[i] = std::min(lower.upper(i), upper.upper(i)) - std::max(lower.lower(i), upper.lower(i));
+      shared[i] =
+          std::min(lower.upper(i), upper.upper(i)) - std::max(lower.lower(i), upper.lower(i));
       if (!(shared[i] > 0.0f)) return 0.0f;
     }
     return shared[axis] * (shared[(axis + 1) % 3] + shared[(axis + 2) % 3]);
@@ -191,8 +192,7 @@ class TopSplitter {
     lower.depth = upper.depth = range.depth + 1;
     float below[2];
     tbb::parallel_invoke([&] { below[0] = split(lower); }, [&] { below[1] = split(upper); });
-    if (getenv("OV") && range.count > 8192) fprintf(stderr, "depth %d count %u overlap %g\n", range.depth, range.count, overlap / root_area_);
-    return getenv("SUM") ? overlap + below[0] + below[1] : std::max({overlap, below[0], below[1]});
+    return std::max({overlap, below[0], below[1]});
   }
 
   // Sorts the references, counts those of the lower side and finds both sides' bounds. Returns what
@@ -303,9 +303,25 @@ SubtreeRoom::SubtreeRoom()
       spare_(std::make_unique_for_overwrite<Reference[]>(kSubtree)) {}
 
 void SubtreeRoom::build(const TopRange& range, const TopOptions& options,
+                        const LooseReference* references, BinaryNode* nodes, LocalTriangle* local) {
+  for (std::uint32_t i = 0; i < range.count; ++i) {
+    const LooseReference& from = references[range.first + i];
+    local[i] = {from.corners, from.triangle};
+  }
+  loose_.pack(references + range.first, range.count, references_.get());
+  for (std::uint32_t i = 0; i < range.count; ++i) references_[i].triangle = i;
+  build(range, options, nodes, 1, BinaryTree::kRoot);
+}
+
+void SubtreeRoom::build(const TopRange& range, const TopOptions& options,
                         const LooseReference* references, BinaryNode* nodes,
                         std::uint32_t first_pair, std::uint32_t root) {
   loose_.pack(references + range.first, range.count, references_.get());
+  build(range, options, nodes, first_pair, root);
+}
+
+void SubtreeRoom::build(const TopRange& range, const TopOptions& options, BinaryNode* nodes,
+                        std::uint32_t first_pair, std::uint32_t root) {
   splitter_.subtree({references_.get(), spare_.get(), range.count, range.bounds, nodes, first_pair,
                      root, options.bins, std::max(options.sah_depth - range.depth, 0)});
 }

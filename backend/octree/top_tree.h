@@ -24,8 +24,8 @@ struct TopRange {
   std::uint32_t first = 0, count = 0;
   int depth = 0;
   Bounds8 bounds;
-  std::uint32_t subtree = 0;                // its number, where it is not split
-  std::unique_ptr<TopRange> lower, upper;   // both or none
+  std::uint32_t subtree = 0;               // its number, where it is not split
+  std::unique_ptr<TopRange> lower, upper;  // both or none
 };
 
 struct TopTree {
@@ -39,6 +39,11 @@ struct TopTree {
 // threads. Needs at least one triangle.
 TopTree split_top(const BuildInput& input, const TopOptions& options, LooseReference* references);
 
+struct LocalTriangle {
+  Corners corners;
+  std::uint32_t triangle;
+};
+
 // Room in which one thread builds subtrees.
 class SubtreeRoom {
  public:
@@ -48,8 +53,15 @@ class SubtreeRoom {
   // nodes[root], and its pairs are the count - 1 from first_pair on.
   void build(const TopRange& range, const TopOptions& options, const LooseReference* references,
              BinaryNode* nodes, std::uint32_t first_pair, std::uint32_t root);
+  // The same tree by itself, in nodes[kRoot] and the pairs from 1 on. Its leaves name places in
+  // `local`, which is filled as well.
+  void build(const TopRange& range, const TopOptions& options, const LooseReference* references,
+             BinaryNode* nodes, LocalTriangle* local);
 
  private:
+  void build(const TopRange& range, const TopOptions& options, BinaryNode* nodes,
+             std::uint32_t first_pair, std::uint32_t root);
+
   LooseSplitter loose_;
   ObjectSplitter splitter_;
   std::unique_ptr<Reference[]> references_, spare_;

@@ -26,13 +26,13 @@ struct HugeAllocator {
   T* allocate(std::size_t size) {
     if (size > std::numeric_limits<std::size_t>::max() / sizeof(T)) throw std::bad_alloc();
     const std::size_t bytes = size * sizeof(T);
-    return static_cast<T*>(bytes < kHugePage ? ::operator new(bytes, std::align_val_t{alignof(T)})
+    return static_cast<T*>(bytes < kHugePage ? ::operator new (bytes, std::align_val_t{alignof(T)})
                                              : map_huge(bytes));
   }
   void deallocate(T* memory, std::size_t size) noexcept {
     const std::size_t bytes = size * sizeof(T);
     if (bytes < kHugePage) {
-      ::operator delete(memory, std::align_val_t{alignof(T)});
+      ::operator delete (memory, std::align_val_t{alignof(T)});
     } else {
       unmap_huge(memory, bytes);
     }
