@@ -80,6 +80,11 @@ struct BinaryNode {
 };
 static_assert(sizeof(BinaryNode) == 32);
 
+// Walks down a whole tree wait for memory, unless children are asked for while others are at work.
+inline void ask_for_children(const BinaryNode* nodes, const BinaryNode& node) {
+  if (!node.leaf()) __builtin_prefetch(&nodes[2 * std::uint64_t{node.child}]);
+}
+
 // Pair p is nodes[2 * p] and nodes[2 * p + 1]; the root is nodes[kRoot]. Builders give every range
 // of references its own pairs, so threads share nothing and the numbers do not depend on them; some
 // pairs stay unused and uninitialised.

@@ -27,6 +27,8 @@ void Family::share_out(const BinaryNode* nodes, std::uint32_t root, int slots, b
     index[count++] = root;
     return;
   }
+  ask_for_children(nodes, nodes[2 * node.child]);
+  ask_for_children(nodes, nodes[2 * node.child + 1]);
   share_out(nodes, 2 * node.child, first, false);
   share_out(nodes, 2 * node.child + 1, slots - first, false);
 }

@@ -47,23 +47,38 @@ class Planner {
   }
 
  private:
-  HWY_ATTR void plan(std::uint32_t index, int depth, Costs& costs) {
+  HWY_ATTR HWY_INLINE void plan(std::uint32_t index, int depth, Costs& costs) {
     BinaryNode& node = nodes_[index];
     store(infinities(), costs.word);
-    if (node.leaf() || depth == kMaxBinaryDepth) {
-      // Written only when it changes: a store at every leaf took its cache line from the others.
-      if (!node.leaf()) too_deep_ = true;
-      store(eight(node.half_area() * kTriangleCost), costs.word + 8);
+    if (node.leaf()) {
+      plan_leaf(node, costs);
+    } else {
+      plan_inner(node, depth, costs);
+    }
+  }
+
+  HWY_ATTR HWY_INLINE void plan_leaf(BinaryNode& node, Costs& costs) {
+    costs.references = 1;
+    float cost = node.half_area() * kTriangleCost;
+    node.plan = kLeafPlan;
+    if (costs_ != nullptr) {
+      cost = costs_[node.triangle()];
+      costs.references = leaf_ + 1;
+      node.plan = 0;
+    }
+    store(eight(cost), costs.word + 8);
+  }
+
+  HWY_ATTR HWY_NOINLINE void plan_inner(BinaryNode& node, int depth, Costs& costs) {
+    if (depth == kMaxBinaryDepth) {
+      too_deep_ = true;
+      store(eight(0.0f), costs.word + 8);
       costs.references = 1;
-      node.plan = kLeafPlan;
-      if (costs_ != nullptr && node.leaf()) {
-        store(eight(costs_[node.triangle()]), costs.word + 8);
-        costs.references = leaf_ + 1;
-        node.plan = 0;
-      }
       return;
     }
     const std::uint32_t first = 2 * node.child;
+    ask_for_children(nodes_, nodes_[first]);
+    ask_for_children(nodes_, nodes_[first + 1]);
     Costs a, b;
     if (node.plan > kParallel) {  // still the builder's count
       tbb::parallel_invoke([&] { plan(first, depth + 1, a); },
@@ -75,22 +90,26 @@ class Planner {
     node.plan = combine(node.half_area(), a, b, costs);
   }
 
-  // For each number of slots the best way to share them out.
+  // For each number of slots the best way to share them out. The first child's costs are read at
+  // offsets, since they were stored longer ago: what was just stored in parts cannot be loaded
+  // across them without a wait.
   HWY_ATTR HWY_INLINE std::uint32_t combine(float area, const Costs& a, const Costs& b,
                                             Costs& costs) const {
     const hn::RebindToUnsigned<decltype(kTag)> du;
     Eight best;
     hn::Vec<decltype(du)> share[kParts];  // of the first child, for 1 to 8 slots
     for (std::size_t part = 0; part < kParts; ++part) {
-      const float* theirs = b.word + 8 + part * kLanes;
-      best.part[part] = hn::Add(hn::Set(kTag, a.word[8]), hn::LoadU(kTag, theirs - 1));
+      const float* firsts = a.word + 8 + part * kLanes;
+      const auto number = hn::Iota(du, static_cast<std::uint32_t>(1 + part * kLanes));
+      best.part[part] = hn::Set(kTag, std::numeric_limits<float>::infinity());
       share[part] = hn::Set(du, 1);
-      for (int k = 2; k < kChildren; ++k) {
-        const auto cost = hn::Add(hn::Set(kTag, a.word[7 + k]), hn::LoadU(kTag, theirs - k));
+      for (int k = kChildren - 1; k > 0; --k) {  // slots of the second child
+        const auto cost = hn::Add(hn::Set(kTag, b.word[7 + k]), hn::LoadU(kTag, firsts - k));
         const auto better = hn::Lt(cost, best.part[part]);
         best.part[part] = hn::IfThenElse(better, cost, best.part[part]);
         share[part] = hn::IfThenElse(hn::RebindMask(du, better),
-                                     hn::Set(du, static_cast<std::uint32_t>(k)), share[part]);
+                                     hn::Sub(number, hn::Set(du, static_cast<std::uint32_t>(k))),
+                                     share[part]);
       }
     }
     costs.references = a.references + b.references;
