@@ -30,8 +30,8 @@ struct Chunk {
 class Workplace {
  public:
   Workplace()
-      : nodes_(std::make_unique_for_overwrite<BinaryNode[]>(2 * kSubtree)),
-        local_(std::make_unique_for_overwrite<LocalTriangle[]>(kSubtree)) {}
+      : nodes_(std::make_unique_for_overwrite<BinaryNode[]>(2 * kMostInSubtree)),
+        local_(std::make_unique_for_overwrite<LocalTriangle[]>(kMostInSubtree)) {}
 
   // Returns the subtree's cost in one slot.
   float build(const TopRange& range, const TopOptions& options, std::uint32_t leaf_triangles,
@@ -54,7 +54,7 @@ class Workplace {
   SubtreeRoom room_;
   std::unique_ptr<BinaryNode[]> nodes_;
   std::unique_ptr<LocalTriangle[]> local_;
-  Blocks<kernels::Node, 4 * kSubtree> written_;
+  Blocks<kernels::Node, 2 * kMostInSubtree> written_;
 };
 
 class TopWriter {

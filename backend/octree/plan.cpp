@@ -36,8 +36,8 @@ struct Costs {
 class Planner {
  public:
   // `costs`: of the subtrees that leaves stand for; null: leaves are triangles.
-  Planner(BinaryNode* nodes, std::uint32_t leaf, const float* costs)
-      : nodes_(nodes), leaf_(leaf), costs_(costs) {}
+  Planner(BinaryNode* nodes, std::uint32_t leaf, const float* costs, bool parallel)
+      : nodes_(nodes), leaf_(leaf), costs_(costs), parallel_(parallel) {}
 
   HWY_ATTR bool run(float& cost) {
     Costs costs;
@@ -80,7 +80,7 @@ class Planner {
     ask_for_children(nodes_, nodes_[first]);
     ask_for_children(nodes_, nodes_[first + 1]);
     Costs a, b;
-    if (node.plan > kParallel) {  // still the builder's count
+    if (parallel_ && node.plan > kParallel) {  // still the builder's count
       tbb::parallel_invoke([&] { plan(first, depth + 1, a); },
                            [&] { plan(first + 1, depth + 1, b); });
     } else {
@@ -140,12 +140,13 @@ class Planner {
   BinaryNode* nodes_;
   const std::uint32_t leaf_;
   const float* const costs_;
+  const bool parallel_;
   std::atomic<bool> too_deep_{false};
 };
 
 HWY_ATTR bool plan_all(BinaryNode* nodes, std::uint32_t leaf_triangles, const float* costs,
-                       float& cost) {
-  return Planner(nodes, leaf_triangles, costs).run(cost);
+                       bool parallel, float& cost) {
+  return Planner(nodes, leaf_triangles, costs, parallel).run(cost);
 }
 
 }  // namespace octrace::octree::HWY_NAMESPACE
@@ -158,18 +159,18 @@ HWY_EXPORT(plan_all);
 
 bool plan(BinaryNode* nodes, std::uint32_t leaf_triangles) {
   float cost;
-  return HWY_DYNAMIC_DISPATCH(plan_all)(nodes, leaf_triangles, nullptr, cost);
+  return HWY_DYNAMIC_DISPATCH(plan_all)(nodes, leaf_triangles, nullptr, true, cost);
 }
 
 float plan_subtree(BinaryNode* nodes, std::uint32_t leaf_triangles) {
   float cost;
-  HWY_DYNAMIC_DISPATCH(plan_all)(nodes, leaf_triangles, nullptr, cost);
+  HWY_DYNAMIC_DISPATCH(plan_all)(nodes, leaf_triangles, nullptr, false, cost);
   return cost;
 }
 
 void plan_top(BinaryNode* nodes, const float* costs) {
   float cost;
-  HWY_DYNAMIC_DISPATCH(plan_all)(nodes, 0, costs, cost);
+  HWY_DYNAMIC_DISPATCH(plan_all)(nodes, 0, costs, false, cost);
 }
 
 }  // namespace octrace::octree

@@ -29,6 +29,16 @@ Bounds8 joined(Bounds8 a, const Bounds8& b) {
   return a;
 }
 
+// From how few references on a range is a subtree. Its root is an eight-way node of its own, so
+// above it there should be room for whole levels of those, as in a tree of triangles / 8^m each;
+// half as many more, because halves are uneven. Other sizes up to the most gave up to a tenth more
+// nodes a ray.
+std::uint32_t subtree_size(std::uint32_t triangles) {
+  std::uint64_t size = std::uint64_t{3} * triangles / 2;
+  while (size > kMostInSubtree) size /= kernels::kChildren;
+  return static_cast<std::uint32_t>(std::max<std::uint64_t>(size, 1));
+}
+
 std::uint32_t blocks_of(std::uint32_t count) { return (count + kBlock - 1) / kBlock; }
 
 // Calls body(block, first, count) for runs of references, at the same time where there are many.
@@ -116,7 +126,10 @@ void exchange(const Half& lower, const Half& upper) {
 class TopSplitter {
  public:
   TopSplitter(const BuildInput& input, const TopOptions& options, LooseReference* references)
-      : input_(input), options_(options), references_(references) {}
+      : input_(input),
+        options_(options),
+        references_(references),
+        subtree_(subtree_size(static_cast<std::uint32_t>(input.triangles.size()))) {}
 
   TopTree run() {
     TopTree tree;
@@ -124,7 +137,6 @@ class TopSplitter {
     TopRange& root = *tree.root;
     root.count = static_cast<std::uint32_t>(input_.triangles.size());
     root.bounds = make_references(root.count);
-    root_area_ = root.bounds.half_area();
     const float overlap = split(root), area = root.bounds.half_area();
     tree.overlap = area > 0.0f ? overlap / area : 0.0f;
     list(root, tree.subtrees);
@@ -181,7 +193,7 @@ class TopSplitter {
 
   // Returns the most that the two sides of a split share.
   float split(TopRange& range) {
-    if (range.count <= kSubtree) return 0.0f;
+    if (range.count <= subtree_) return 0.0f;
     range.lower = std::make_unique<TopRange>();
     range.upper = std::make_unique<TopRange>();
     TopRange &lower = *range.lower, &upper = *range.upper;
@@ -266,7 +278,7 @@ class TopSplitter {
   const BuildInput& input_;
   const TopOptions& options_;
   LooseReference* const references_;
-  float root_area_;
+  const std::uint32_t subtree_;
   const LooseSplitter loose_;
   const ObjectSplitter splitter_;
 };
@@ -299,8 +311,8 @@ TopTree split_top(const BuildInput& input, const TopOptions& options, LooseRefer
 }
 
 SubtreeRoom::SubtreeRoom()
-    : references_(std::make_unique_for_overwrite<Reference[]>(kSubtree)),
-      spare_(std::make_unique_for_overwrite<Reference[]>(kSubtree)) {}
+    : references_(std::make_unique_for_overwrite<Reference[]>(kMostInSubtree)),
+      spare_(std::make_unique_for_overwrite<Reference[]>(kMostInSubtree)) {}
 
 void SubtreeRoom::build(const TopRange& range, const TopOptions& options,
                         const LooseReference* references, BinaryNode* nodes, LocalTriangle* local) {

@@ -10,9 +10,9 @@
 
 namespace octrace::octree {
 
-// References of a subtree. 128 KiB of them, and twice as much of binary nodes, are about what a
-// core's second cache holds.
-inline constexpr std::uint32_t kSubtree = 4096;
+// The most references of a subtree: 256 KiB of them, and twice as much of binary nodes, stay in a
+// core's caches while they are worked on.
+inline constexpr std::uint32_t kMostInSubtree = 8192;
 
 struct TopOptions {
   int bins = 16;
