@@ -84,11 +84,13 @@ void build_sah(const BuildInput& input, std::uint32_t leaf_triangles, bool quali
 }
 
 std::uint64_t sah_build_bytes(std::uint64_t triangles, bool quality) {
-  constexpr double kTree = 2 * sizeof(BinaryNode), kNodes = sizeof(kernels::Node) / 8.0;
+  constexpr double kTree = 2 * sizeof(BinaryNode);
   const auto count = static_cast<double>(triangles);
   if (!quality) {
-    // Where re-insertion is tried; else nodes are held twice in place of the binary tree.
-    return static_cast<std::uint64_t>(count * (sizeof(LooseReference) + kTree + kNodes));
+    // Where re-insertion is tried; else nodes, of which there is one for six triangles or more, are
+    // held twice in place of the binary tree.
+    constexpr double kDraft = sizeof(kernels::Node) / 6.0 + sizeof(std::uint32_t);
+    return static_cast<std::uint64_t>(count * (sizeof(LooseReference) + kTree + kDraft));
   }
   constexpr double kReferences = 2 * sizeof(Reference);
   const double references = count * (1.0 + double{quality_options().duplicates});

@@ -124,8 +124,7 @@ TEST(OctreeEncode, MatchesThePlainTexts) {
 
 struct OctreeTargets : testing::TestWithParam<std::size_t> {};
 
-TEST_P(OctreeTargets, MakeTheSameOctree) {
-  const Mesh mesh = hard_meshes()[GetParam()];
+void expect_the_same_octree(const Mesh& mesh) {
   for (const octree::Builder builder : {octree::Builder::sah, octree::Builder::quality}) {
     octree::BuildOptions options;
     options.builder = builder;
@@ -144,6 +143,13 @@ TEST_P(OctreeTargets, MakeTheSameOctree) {
                 0);
     });
   }
+}
+
+TEST_P(OctreeTargets, MakeTheSameOctree) { expect_the_same_octree(hard_meshes()[GetParam()]); }
+
+TEST(OctreeSubtreeTargets, MakeTheSameOctreeOfSeveralSubtrees) {
+  expect_the_same_octree(make_grid(70, 0.1f, 2.0f));
+  expect_the_same_octree(make_sphere(120, kernels::Vec3(1.0f), 3.0f));
 }
 
 INSTANTIATE_TEST_SUITE_P(Meshes, OctreeTargets,

@@ -1,0 +1,194 @@
+// Scenes of several subtrees (backend/octree/top_tree.h): the ranges that threads take, and the
+// octrees made of them. The other tests' meshes are smaller than one subtree.
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+#include <tbb/task_arena.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <functional>
+
+#include "backend/octree/builders.h"
+#include "backend/octree/top_tree.h"
+#include "kernels/cpu/intersect.h"
+#include "tests/support/brute_force.h"
+#include "tests/support/intensity.h"
+#include "tests/support/meshes.h"
+
+namespace octrace::tests {
+namespace {
+
+using kernels::Vec3;
+
+constexpr unsigned kThreads[] = {1, 2, 3, 8};
+
+using Corner = std::function<Vec3(std::uint32_t triangle, int corner, std::mt19937_64&)>;
+
+Mesh make(const char* name, std::uint32_t count, const Corner& corner) {
+  Mesh mesh{name, {}, {}};
+  std::mt19937_64 random(count);
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const auto first = static_cast<std::uint32_t>(mesh.positions.size());
+    for (int c = 0; c < 3; ++c) mesh.positions.push_back(corner(i, c, random));
+    mesh.triangles.push_back({first, first + 1, first + 2});
+  }
+  return mesh;
+}
+
+float uniform(std::mt19937_64& random) { return static_cast<float>(random() >> 40) * 0x1p-24f; }
+
+Mesh make_dust(std::uint32_t count, float scale = 1.0f) {
+  Vec3 centre;
+  return make("dust", count, [&](std::uint32_t, int c, std::mt19937_64& random) {
+    const Vec3 v(uniform(random), uniform(random), uniform(random));
+    if (c == 0) centre = v;
+    return scale * (centre + 0.01f * v);
+  });
+}
+
+// From 5461 triangles on a scene has more than one range, of up to 8192 references; at 43696 the
+// ranges become smaller (subtree_size() in top_tree.cpp).
+std::vector<Mesh> large_meshes() {
+  std::vector<Mesh> meshes;
+  for (const std::uint32_t count :
+       {5460u, 5461u, 5462u, 8191u, 8192u, 8193u, 43690u, 43695u, 43696u, 100000u}) {
+    meshes.push_back(make_dust(count));
+    meshes.back().name += " " + std::to_string(count);
+  }
+  meshes.push_back(make("one place", 8193, [](std::uint32_t, int c, std::mt19937_64&) {
+    return Vec3(c == 0, c == 1, c == 2);
+  }));
+  meshes.push_back(make("one point", 20000, [](std::uint32_t, int, std::mt19937_64&) {
+    return Vec3(3.0f, -2.0f, 1.0f);
+  }));
+  meshes.push_back(make("long slivers", 20000, [](std::uint32_t i, int c, std::mt19937_64& random) {
+    const float y = static_cast<float>(i) * 1e-4f;
+    return c == 0   ? Vec3(-100.0f, y, 0.0f)
+           : c == 1 ? Vec3(100.0f, y, uniform(random))
+                    : Vec3(100.0f, y + 1e-6f, 0.0f);
+  }));
+  meshes.push_back(
+      make("one huge among many", 20000, [](std::uint32_t i, int c, std::mt19937_64& r) {
+        if (i == 7777)
+          return Vec3(c == 0 ? 1e4f : -1.0f, c == 1 ? 1e4f : -1.0f, c == 2 ? 1e4f : -1.0f);
+        return Vec3(uniform(r), uniform(r), uniform(r)) * 0.01f + Vec3(static_cast<float>(i % 141));
+      }));
+  meshes.push_back(make_dust(20000, 1e-42f));  // denormals
+  meshes.back().name = "denormals";
+  meshes.push_back(make_dust(20000, 9e8f));
+  meshes.back().name = "far";
+  // Ever smaller triangles about one corner: the deepest trees, from which halving by rank saves.
+  meshes.push_back(make("chain", 20000, [](std::uint32_t i, int c, std::mt19937_64&) {
+    const float s = std::exp2(-0.007f * static_cast<float>(i));
+    return Vec3(c == 0 ? s : 0.0f, c == 1 ? s : 0.0f, c == 2 ? s : 0.0f);
+  }));
+  return meshes;
+}
+
+template <class T, class Allocator>
+bool same_bytes(const std::vector<T, Allocator>& a, const std::vector<T, Allocator>& b) {
+  return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(T)) == 0;
+}
+
+struct OctreeSubtrees : testing::TestWithParam<std::size_t> {
+  // As many threads as are asked for, on machines of fewer cores as well.
+  tbb::global_control more{tbb::global_control::max_allowed_parallelism, 8};
+  Mesh mesh = large_meshes()[GetParam()];
+};
+
+TEST_P(OctreeSubtrees, RangesHoldAllReferences) {
+  const octree::BuildInput input = mesh.input();
+  const std::size_t count = input.triangles.size();
+  for (const int sah_depth : {64, 3, 0}) {
+    octree::TopOptions options;
+    options.sah_depth = sah_depth;
+    std::vector<std::uint32_t> expected;
+    for (const unsigned threads : kThreads) {
+      std::vector<octree::LooseReference> references(count);
+      octree::TopTree top;
+      tbb::task_arena(static_cast<int>(threads)).execute([&] {
+        top = octree::split_top(input, options, references.data());
+      });
+      EXPECT_EQ(top.subtrees.size() > 1, count > 5461);
+      std::uint32_t next = 0;
+      std::vector<std::uint32_t> triangles;
+      for (const octree::TopRange* range : top.subtrees) {
+        ASSERT_EQ(range->first, next);
+        ASSERT_GT(range->count, 0u);
+        ASSERT_LE(range->count, octree::kMostInSubtree);
+        next += range->count;
+        octree::Box bounds;
+        for (std::uint32_t i = range->first; i < next; ++i) {
+          const octree::LooseReference& reference = references[i];
+          triangles.push_back(reference.triangle);
+          ASSERT_LT(reference.triangle, count);
+          ASSERT_EQ(reference.corners.a, input.triangles[reference.triangle].a);
+          bounds.add(octree::triangle_box(input, reference.triangle));
+        }
+        for (int axis = 0; axis < 3; ++axis) {
+          EXPECT_EQ(range->bounds.lower(axis), bounds.lower[axis]);
+          EXPECT_EQ(range->bounds.upper(axis), bounds.upper[axis]);
+        }
+      }
+      EXPECT_EQ(next, count);
+      if (threads == 1) expected = triangles;
+      EXPECT_EQ(triangles, expected) << threads << " threads";
+      std::sort(triangles.begin(), triangles.end());
+      for (std::uint32_t i = 0; i < count; ++i) ASSERT_EQ(triangles[i], i);
+    }
+  }
+}
+
+TEST_P(OctreeSubtrees, AreSoundAndTheSameForAnyThreadCount) {
+  octree::Octree expected;
+  for (const std::uint32_t leaf : {0u, 1u}) {
+    for (const unsigned threads : kThreads) {
+      octree::BuildOptions options;
+      options.threads = threads;
+      options.leaf = leaf;
+      util::Result<octree::Octree> octree = octree::build(mesh.input(), options);
+      ASSERT_TRUE(octree);
+      EXPECT_EQ(octree->triangles.size(), mesh.triangles.size());
+      if (threads == 1) {
+        const util::Result<void> ok = octree::verify(*octree, mesh.input());
+        ASSERT_TRUE(ok) << mesh.name << ": " << ok.error().to_string();
+        expected = std::move(*octree);
+        continue;
+      }
+      EXPECT_TRUE(same_bytes(octree->nodes, expected.nodes)) << threads << " threads";
+      EXPECT_TRUE(same_bytes(octree->triangles, expected.triangles)) << threads << " threads";
+    }
+  }
+}
+
+TEST_P(OctreeSubtrees, HitWhatBruteForceHits) {
+  const util::Result<octree::Octree> octree = octree::build(mesh.input(), {});
+  ASSERT_TRUE(octree);
+  kernels::SceneView view;
+  view.octree = octree->view();
+  const kernels::CpuTracer tracer;
+  std::mt19937_64 random(seed());
+  for (std::uint64_t i = 0; i < scaled(500); ++i) {
+    const kernels::Ray ray = random_ray(mesh, *octree, random);
+    const kernels::Hit expected = brute_force(mesh.positions, mesh.triangles, ray);
+    kernels::Hit found;
+    ASSERT_EQ(kernels::TraceStatus::ok, tracer.closest(view, {}, ray, &found));
+    ASSERT_EQ(found.triangle, expected.triangle)
+        << mesh.name << ", seed " << seed() << ", ray " << i;
+    if (expected.valid()) {
+      ASSERT_EQ(0, std::memcmp(&found.t, &expected.t, sizeof(float)));
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Meshes, OctreeSubtrees,
+                         testing::Range<std::size_t>(0, large_meshes().size()),
+                         [](const auto& about) {
+                           std::string name = large_meshes()[about.param].name;
+                           std::replace(name.begin(), name.end(), ' ', '_');
+                           return name;
+                         });
+
+}  // namespace
+}  // namespace octrace::tests
