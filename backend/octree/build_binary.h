@@ -1,4 +1,4 @@
-// Top-down builds of the binary tree.
+// Top-down builds of the binary tree with spatial splits.
 #pragma once
 
 #include "backend/octree/binary_tree.h"

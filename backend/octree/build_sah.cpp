@@ -1,5 +1,6 @@
-// The SAH builders: a binary tree from above (build_binary.h), improved by reinsertion
-// (reinsert.h), collapsed into eight-way nodes (collapse.h).
+// The SAH builders: a binary tree from above (top_tree.h, build_binary.h), improved by reinsertion
+// (reinsert.h), collapsed into eight-way nodes (collapse.h). Where reinsertion has nothing to gain,
+// the tree is never whole (build_subtrees.h).
 #include "backend/octree/build_binary.h"
 #include "backend/octree/build_subtrees.h"
 #include "backend/octree/builders.h"
@@ -22,8 +23,8 @@ BinaryOptions quality_options() {
   return options;
 }
 
-// The part of the root's surface that two sides of a split at the top share, above which
-// re-insertion is tried, which needs the whole binary tree.
+// TopTree::overlap from which re-insertion is tried, which needs the whole binary tree: bunny,
+// terrain and soup have 0.001 to 0.006 and gain nothing from it, sponza has 0.24 and gains much.
 constexpr float kWorthMoving = 0.02f;
 
 // Share of triangles from which a tree counts as one with cuts.

@@ -31,7 +31,9 @@ struct TopRange {
 struct TopTree {
   std::unique_ptr<TopRange> root;
   std::vector<const TopRange*> subtrees;  // in order of their references
-  // The most that the two sides of a split share, as part of the root's surface.
+  // How far sides of splits reach into each other: the most surface that two of them share, less
+  // the faces that any two neighbours share, as part of the root's. Large triangles among small
+  // ones make it large.
   float overlap = 0.0f;
 };
 
