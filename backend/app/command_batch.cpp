@@ -208,7 +208,7 @@ void declare_running(CLI::App& command, BatchRequest& request) {
       ->type_name("N");
   command
       .add_option("--threads", request.run.threads,
-                  "threads that trace, and as many that encode; 0: all cores [0]")
+                  "threads that trace; two more encode and write; 0: all cores [0]")
       ->check(CLI::Range(0, 4096).description(""))
       ->type_name("N");
   add_choice<BatchProgressMode>(

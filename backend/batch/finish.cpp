@@ -14,14 +14,13 @@ util::Result<void> write_results(const Plan& plan, const RunOptions& options,
           .dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) +
       "\n";
   const bool divided = options.shard.count > 1;
-  const auto write_summary = [&] {
-    return util::write_file(
-        divided ? shard_summary_path(plan.folder(), options.shard) : plan.folder() + "summary.json",
-        text);
-  };
-  if (divided || summary.interrupted || summary.fatal) return write_summary();
-  auto written = write_job_results(plan, [&](const JobResults&) { return write_summary(); });
-  return written ? util::Result<void>() : written.error();
+  if (!divided && !summary.interrupted && !summary.fatal) {
+    if (auto written = write_job_results(plan); !written) return written.error();
+  }
+  // Last: who finds it finds the others, in the same folder, which this flushes.
+  return util::write_file(
+      divided ? shard_summary_path(plan.folder(), options.shard) : plan.folder() + "summary.json",
+      text);
 }
 
 }  // namespace octrace::batch

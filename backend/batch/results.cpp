@@ -206,8 +206,7 @@ ordered_json summary_of(const Plan& plan, const JobResults& results) {
 
 }  // namespace
 
-Result<JobResults> write_job_results(const Plan& plan,
-                                     const std::function<Result<void>(const JobResults&)>& beside) {
+Result<JobResults> write_job_results(const Plan& plan) {
   auto gathered = gather(plan);
   if (!gathered) return gathered.error();
   Files files;
@@ -218,11 +217,8 @@ Result<JobResults> write_job_results(const Plan& plan,
     if (!line) return line.error();
     if (auto ok = files.add(*line); !ok) return ok.error();
   }
-  const JobResults results = count(plan, *gathered);
-  auto commits = files.commits();
-  commits.emplace_back([&] { return beside(results); });
-  if (auto ok = util::commit_together(plan.folder(), commits); !ok) return ok.error();
-  return results;
+  if (auto ok = util::commit_together(files.commits()); !ok) return ok.error();
+  return count(plan, *gathered);
 }
 
 Result<JobResults> merge_job(const Plan& plan, const util::Limits& limits, double wait_lock) {
@@ -235,12 +231,15 @@ Result<JobResults> merge_job(const Plan& plan, const util::Limits& limits, doubl
   auto lock = RunLock::acquire(plan.folder(), Shard(), {wait_lock, true});
   if (!lock) return lock.error();
   if (auto same = check_same_job(plan, plan.meaning(limits)); !same) return same.error();
-  return write_job_results(plan, [&](const JobResults& results) {
-    return util::write_file(
-        plan.folder() + "summary.json",
-        summary_of(plan, results).dump(2, ' ', false, ordered_json::error_handler_t::replace) +
-            "\n");
-  });
+  auto results = write_job_results(plan);
+  if (!results) return results.error();
+  // Last: who finds it finds the others.
+  const std::string text =
+      summary_of(plan, *results).dump(2, ' ', false, ordered_json::error_handler_t::replace) + "\n";
+  if (auto written = util::write_file(plan.folder() + "summary.json", text); !written) {
+    return written.error();
+  }
+  return results;
 }
 
 }  // namespace octrace::batch

@@ -3,7 +3,6 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <nlohmann/json.hpp>
 #include <utility>
 #include <vector>
@@ -33,9 +32,8 @@ struct JobResults {
 // Reads the journals once, then each view's line again in the order of views: memory is 16 bytes a
 // view and the scenes' objects. A view is done when its line is there and its files have the sizes
 // that the line says. Exit 5 where a file cannot be written; a usage error where a journal belongs
-// to another job. `beside` writes another file of the same folder, while these are flushed.
-util::Result<JobResults> write_job_results(
-    const Plan& plan, const std::function<util::Result<void>(const JobResults&)>& beside);
+// to another job. The caller flushes the folder, or writes another file there, which does so.
+util::Result<JobResults> write_job_results(const Plan& plan);
 
 // `octrace batch JOB.json --merge`: the same for the journals of all shards, and summary.json. Exit
 // 5 where a run holds a lock of the folder for longer than `wait_lock` seconds.

@@ -350,7 +350,7 @@ Result<RunSummary> run_plan(const Plan& plan, const RunOptions& options) {
                              {"failed", summary.standing.failed},
                              {"interrupted", summary.interrupted}};
   auto ended = append(*journal, last);
-  if (ended) ended = journal->flush();
+  if (auto flushed = journal->flush(); ended) ended = flushed;
   if (!ended && !summary.fatal) summary.fatal = ended.error();
   return summary;
 }

@@ -32,7 +32,7 @@ struct RunOptions {
   Shard shard;
   bool force = false;
   double wait_lock = 0.0;  // seconds (LockWait)
-  unsigned threads = 0;    // that trace, and as many that encode; 0: all cores
+  unsigned threads = 0;    // that trace; two more encode and write; 0: all cores
   std::uint32_t tile = 0;
   bool verify = false;
   octree::BuildOptions build;

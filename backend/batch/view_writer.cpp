@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <new>
+#include <system_error>
 
 #include "backend/batch/camera_choice.h"
 #include "backend/batch/output.h"
@@ -74,8 +75,8 @@ ViewWriter::ViewWriter(const Plan& plan, Journal& journal, unsigned threads, std
     packs_.emplace(plan, [this](const ordered_json& line) { return note(line); });
   }
   const FramebufferCounts counts = framebuffer_counts(plan, threads);
-  // Two more than there are processors: some wait for the disk.
-  const std::size_t writers = std::min<std::size_t>(threads + 2, counts.steady - 1);
+  // Two more than processors: some wait for the disk, and then they hold no framebuffer.
+  const std::size_t writers = std::size_t{threads} + 2;
   // All at once: were they made when first needed, a late moment of slow writing would add one, and
   // memory would grow with the number of views.
   const ImageSize& size = plan.job().size;
@@ -84,7 +85,14 @@ ViewWriter::ViewWriter(const Plan& plan, Journal& journal, unsigned threads, std
         std::make_unique<render::Framebuffer>(size.width, size.height, plan.needed_aovs()));
   }
   spare_ = free_.size() - std::min(counts.steady, free_.size());
-  for (std::size_t i = 0; i < writers; ++i) threads_.emplace_back([this] { work(); });
+  for (std::size_t i = 0; i < writers; ++i) {
+    try {
+      threads_.emplace_back([this] { work(); });
+    } catch (const std::system_error&) {  // no more threads are to be had
+      if (threads_.empty()) throw;
+      break;
+    }
+  }
 }
 
 ViewWriter::~ViewWriter() { finish(); }
@@ -156,10 +164,41 @@ void ViewWriter::work() {
 
 void ViewWriter::write(TracedView& view) {
   const util::Timer timer;
+  double flush_ms = 0.0;
   std::vector<PackMember> members;
+  Result<ordered_json> made = encode(view, members, flush_ms);
+  const double write_ms = timer.milliseconds();
+  if (made && !scratch_) {
+    if (auto measured = measure_files(*made); !measured) made = measured.error();
+  }
+  if (!made) {
+    if (util::interrupt_flag()) return;  // dropped: the next run makes it
+    if (made.error().exit == util::Exit::io) return stop(made.error());
+    return fail({view.view.index, view.view.scene, 1, made.error()});
+  }
+  ordered_json& line = *made;
+  line["ms"] = {view.trace_ms, write_ms};
+  if (auto kept = keep(line, std::move(members)); !kept) {
+    if (util::interrupt_flag()) return;
+    return stop(kept.error());
+  }
+  {
+    const std::lock_guard lock(mutex_);
+    ++outcome_.done;
+    outcome_.encode_ms += write_ms - flush_ms;
+    outcome_.flush_ms += flush_ms;
+  }
+  const std::lock_guard lock(report_mutex_);
+  report_();
+}
+
+// The view's line of the journal, once its files have their names.
+Result<ordered_json> ViewWriter::encode(TracedView& view, std::vector<PackMember>& members,
+                                        double& flush_ms) {
+  // Members of packs are no files of their own.
   util::GroupedCommit group(scratch_ ? util::GroupedCommit::When::at_once
                                      : util::GroupedCommit::When::by_finish);
-  auto encoded = [&]() -> Result<ordered_json> {
+  auto line = [&]() -> Result<ordered_json> {
     try {
       auto files = write_files(view, members);
       if (!files) return files;
@@ -170,31 +209,11 @@ void ViewWriter::write(TracedView& view) {
   }();
   // The next view may be traced while this one waits for the disk.
   give_back(std::move(view.framebuffer));
-  const auto failed = [&](const util::Error& error) {
-    if (util::interrupt_flag()) return;  // dropped: the next run makes it
-    if (error.exit == util::Exit::io) return stop(error);
-    fail({view.view.index, view.view.scene, 1, error});
-  };
-  if (!encoded) return failed(encoded.error());
-  if (auto committed = group.finish(); !committed) return failed(committed.error());
-  ordered_json& line = *encoded;
-  const double write_ms = timer.milliseconds();
-  line["ms"] = {view.trace_ms, write_ms};
-  if (auto measured = scratch_ ? Result<void>() : measure_files(line); !measured) {
-    return failed(measured.error());
+  if (line) {
+    if (auto committed = group.finish(); !committed) return committed.error();
   }
-  if (auto kept = keep(line, std::move(members)); !kept) {
-    if (util::interrupt_flag()) return;
-    return stop(kept.error());
-  }
-  {
-    const std::lock_guard lock(mutex_);
-    ++outcome_.done;
-    outcome_.encode_ms += write_ms - group.milliseconds();
-    outcome_.flush_ms += group.milliseconds();
-  }
-  const std::lock_guard lock(report_mutex_);
-  report_();
+  flush_ms = group.milliseconds();
+  return line;
 }
 
 ordered_json ViewWriter::view_line(const TracedView& view, ordered_json files) const {

@@ -67,6 +67,8 @@ class ViewWriter {
   // Of a packed job the files end up in `members`.
   util::Result<nlohmann::ordered_json> write_files(const TracedView& view,
                                                    std::vector<PackMember>& members);
+  util::Result<nlohmann::ordered_json> encode(TracedView& view, std::vector<PackMember>& members,
+                                              double& flush_ms);
   nlohmann::ordered_json view_line(const TracedView& view, nlohmann::ordered_json files) const;
   util::Result<void> measure_files(nlohmann::ordered_json& line);
   util::Result<void> keep(const nlohmann::ordered_json& line, std::vector<PackMember> members);

@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <future>
+#include <system_error>
 
 namespace octrace::util {
 
@@ -38,21 +39,24 @@ void flush_folder(const std::string& folder) {
   ::close(descriptor);
 }
 
-Result<void> commit_together(const std::string& folder,
-                             const std::vector<std::function<Result<void>()>>& commits) {
+Result<void> commit_together(const std::vector<std::function<Result<void>()>>& commits) {
   std::vector<std::future<Result<void>>> running;
   for (const auto& commit : commits) {
-    running.push_back(std::async(std::launch::async, [&commit] {
+    const auto run = [&commit] {
       const GroupedCommit group;
       return commit();
-    }));
+    };
+    try {
+      running.push_back(std::async(std::launch::async, run));
+    } catch (const std::system_error&) {  // no more threads are to be had: one after the other
+      running.push_back(std::async(std::launch::deferred, run));
+    }
   }
   Result<void> result;
   for (auto& one : running) {
     Result<void> committed = one.get();
     if (result && !committed) result = std::move(committed);
   }
-  flush_folder(folder);
   return result;
 }
 

@@ -43,10 +43,8 @@ class GroupedCommit {
 // "": the current folder. A file system that cannot flush a folder is no error.
 void flush_folder(const std::string& folder);
 
-// Runs all of what commits files of one folder, at the same time, and then flushes the folder: one
-// after the other, each file would wait for the disk three times. Returns the first error in the
-// order of the list.
-Result<void> commit_together(const std::string& folder,
-                             const std::vector<std::function<Result<void>()>>& commits);
+// Runs all of what commits files, at the same time: one after the other, each would wait for the
+// disk. The caller flushes their folder. Returns the first error in the order of the list.
+Result<void> commit_together(const std::vector<std::function<Result<void>()>>& commits);
 
 }  // namespace octrace::util

@@ -61,6 +61,43 @@ TEST_F(AtomicFileTest, InAGroupToo) {
   EXPECT_EQ(count(), 1u);
 }
 
+TEST_F(AtomicFileTest, InAGroupThatWaitsTheyAppearWhenItIsFinished) {
+  {
+    util::GroupedCommit group(util::GroupedCommit::When::by_finish);
+    ASSERT_TRUE(util::write_file(path("a.json"), "a"));
+    ASSERT_TRUE(util::write_file(path("b.json"), "b"));
+    EXPECT_FALSE(fs::exists(path("a.json")));
+    ASSERT_TRUE(group.finish());
+    EXPECT_EQ(text(path("a.json")) + text(path("b.json")), "ab");
+    ASSERT_TRUE(util::write_file(path("c.json"), "c"));  // and is not finished
+  }
+  EXPECT_EQ(count(), 2u);
+}
+
+TEST_F(AtomicFileTest, AGroupSaysWhichFileFailedAndDropsTheRest) {
+  util::GroupedCommit group(util::GroupedCommit::When::by_finish);
+  ASSERT_TRUE(util::write_file(path("a.json"), "a"));
+  fs::create_directories(path("a.json") + "/in the way");
+  ASSERT_TRUE(util::write_file(path("b.json"), "b"));
+  const util::Result<void> finished = group.finish();
+  ASSERT_FALSE(finished);
+  EXPECT_EQ(finished.error().file, path("a.json"));
+  EXPECT_EQ(count(), 1u);
+}
+
+TEST_F(AtomicFileTest, CommittedTogetherTheFirstErrorOfTheListCounts) {
+  const auto fails = [&](const std::string& file) {
+    return [file] { return util::write_file(file, "x"); };
+  };
+  const util::Result<void> result =
+      util::commit_together({[&] { return util::write_file(path("a.json"), "a"); },
+                             fails(path("no/b.json")), fails(path("no/c.json"))});
+  ASSERT_FALSE(result);
+  EXPECT_EQ(result.error().file, path("no/b.json"));
+  EXPECT_EQ(text(path("a.json")), "a");
+  EXPECT_TRUE(util::commit_together({}));
+}
+
 TEST_F(AtomicFileTest, VanishesOtherwise) {
   {
     util::Result<util::AtomicFile> file = util::AtomicFile::create(path("a.exr"));
