@@ -5,29 +5,18 @@
 
 #include <tbb/blocked_range.h>
 #include <tbb/enumerable_thread_specific.h>
-#include <tbb/parallel_for.h>
 #include <tbb/parallel_invoke.h>
 #include <tbb/parallel_reduce.h>
 
 #include <algorithm>
-#include <cstring>
 
 #include "backend/octree/builders.h"
+#include "backend/octree/exchange.h"
+#include "backend/octree/reference_blocks.h"
 
 namespace octrace::octree {
 
 namespace {
-
-constexpr std::uint32_t kBlock = 4096;
-constexpr std::uint32_t kParallel = 4 * kBlock;  // references worth a task
-
-Bounds8 joined(Bounds8 a, const Bounds8& b) {
-  for (int i = 0; i < 8; ++i) {
-    a.box[i] = std::min(a.box[i], b.box[i]);
-    a.centres[i] = std::min(a.centres[i], b.centres[i]);
-  }
-  return a;
-}
 
 // From how few references on a range is a subtree. Its root is an eight-way node of its own, so
 // above it there should be room for whole levels of those, as in a tree of triangles / 8^m each;
@@ -37,90 +26,6 @@ std::uint32_t subtree_size(std::uint32_t triangles) {
   std::uint64_t size = std::uint64_t{3} * triangles / 2;
   while (size > kMostInSubtree) size /= kernels::kChildren;
   return static_cast<std::uint32_t>(std::max<std::uint64_t>(size, 1));
-}
-
-std::uint32_t blocks_of(std::uint32_t count) { return (count + kBlock - 1) / kBlock; }
-
-// Calls body(block, first, count) for runs of references, at the same time where there are many.
-template <class Body>
-void for_blocks(std::uint32_t count, const Body& body) {
-  const std::uint32_t blocks = blocks_of(count);
-  const auto run = [&](std::uint32_t block) {
-    body(block, block * kBlock, std::min(kBlock, count - block * kBlock));
-  };
-  if (count <= kParallel) {
-    for (std::uint32_t block = 0; block < blocks; ++block) run(block);
-  } else {
-    tbb::parallel_for(0u, blocks, run);
-  }
-}
-
-// One side of a split before its strangers have left it.
-class Half {
- public:
-  Half(LooseReference* references, std::uint32_t count, bool upper)
-      : references_(references), count_(count), upper_(upper) {}
-
-  // Threads write the notes of their own blocks' references.
-  void search(const LooseSplitter& splitter, const Binning& binning, const ObjectSplit& split) {
-    first_number_.resize(blocks_of(count_) + 1);
-    std::vector<std::array<Bounds8, 2>> bounds(blocks_of(count_));
-    for_blocks(count_, [&](std::uint32_t block, std::uint32_t first, std::uint32_t count) {
-      Bounds8 own[2];
-      first_number_[block + 1] =
-          splitter.find_misplaced(references_ + first, count, upper_, binning, split, own);
-      bounds[block] = {own[0], own[1]};
-    });
-    for (std::size_t i = 1; i < first_number_.size(); ++i) first_number_[i] += first_number_[i - 1];
-    for (const auto& block : bounds) {
-      for (int side = 0; side < 2; ++side) bounds_[side] = joined(bounds_[side], block[side]);
-    }
-  }
-
-  std::uint32_t misplaced() const { return first_number_.back(); }
-  const Bounds8& bounds(int side) const { return bounds_[side]; }
-
-  // Numbers of the misplaced of a block: [first_number(block), first_number(block + 1)).
-  std::uint32_t blocks() const { return blocks_of(count_); }
-  std::uint32_t first_number(std::uint32_t block) const { return first_number_[block]; }
-  std::uint32_t block_of(std::uint32_t number) const {
-    return static_cast<std::uint32_t>(
-        std::upper_bound(first_number_.begin(), first_number_.end(), number) -
-        first_number_.begin() - 1);
-  }
-  LooseReference& in_block(std::uint32_t block, std::uint32_t i) const {
-    LooseReference* const first = references_ + std::size_t{block} * kBlock;
-    return first[first[i].note];
-  }
-
- private:
-  LooseReference* references_;
-  std::uint32_t count_;
-  bool upper_;
-  std::vector<std::uint32_t> first_number_;  // by block, and the sum
-  Bounds8 bounds_[2];                        // of what is in this half and belongs to either side
-};
-
-// Threads take the strangers of a block of the lower half each, and with them as many of the upper
-// half that no other thread has. Notes stay where they are.
-void exchange(const Half& lower, const Half& upper) {
-  const auto run = [&](std::uint32_t block) {
-    const std::uint32_t first = lower.first_number(block), last = lower.first_number(block + 1);
-    if (first == last) return;
-    std::uint32_t other = upper.block_of(first);
-    for (std::uint32_t number = first; number < last; ++number) {
-      while (number >= upper.first_number(other + 1)) ++other;
-      LooseReference& a = lower.in_block(block, number - first);
-      LooseReference& b = upper.in_block(other, number - upper.first_number(other));
-      std::swap(a, b);
-      std::swap(a.note, b.note);
-    }
-  };
-  if (lower.blocks() * kBlock <= kParallel) {
-    for (std::uint32_t block = 0; block < lower.blocks(); ++block) run(block);
-  } else {
-    tbb::parallel_for(0u, lower.blocks(), run);
-  }
 }
 
 class TopSplitter {
