@@ -116,11 +116,12 @@ class Planner {
     alignas(32) float sums[8];
     store(best, sums);
     const float inner = sums[kChildren - 1] + area * kNodeCost;
-    const float leaf = costs.references <= leaf_
-                           ? area * kTriangleCost * static_cast<float>(costs.references)
+    // Where an inner node costs infinitely much as well, the count alone rules out a leaf.
+    const bool few = costs.references <= leaf_;
+    const float leaf = few ? area * kTriangleCost * static_cast<float>(costs.references)
                            : std::numeric_limits<float>::infinity();
     const float one = std::min(inner, leaf);
-    std::uint32_t plan = leaf <= inner ? kLeafPlan : 0u;
+    std::uint32_t plan = few && leaf <= inner ? kLeafPlan : 0u;
     plan |= static_cast<std::uint32_t>(std::bit_width(costs.references) - 1) << 27;
     alignas(32) static constexpr std::uint32_t kFactor[8] = {
         0, 1u << 1, 1u << 4, 1u << 7, 1u << 10, 1u << 13, 1u << 16, 1u << 19};

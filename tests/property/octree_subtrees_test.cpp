@@ -182,6 +182,23 @@ TEST_P(OctreeSubtrees, HitWhatBruteForceHits) {
   }
 }
 
+// Beyond what scenes may hold: surfaces and costs that are infinite.
+TEST(OctreeOfHugeTriangles, IsSound) {
+  for (const float scale : {1e18f, 1e19f, 1e38f}) {
+    for (const std::uint32_t count : {5u, 30u, 20000u}) {
+      const Mesh mesh = make_dust(count, scale);
+      for (const octree::Builder builder : {octree::Builder::sah, octree::Builder::quality}) {
+        octree::BuildOptions options;
+        options.builder = builder;
+        const util::Result<octree::Octree> octree = octree::build(mesh.input(), options);
+        ASSERT_TRUE(octree);
+        const util::Result<void> ok = octree::verify(*octree, mesh.input());
+        EXPECT_TRUE(ok) << scale << ", " << count << ": " << ok.error().to_string();
+      }
+    }
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(Meshes, OctreeSubtrees,
                          testing::Range<std::size_t>(0, large_meshes().size()),
                          [](const auto& about) {
