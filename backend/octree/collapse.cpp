@@ -58,7 +58,8 @@ class Writer {
     const NodeWriter writer(nodes_, input_, octree_.nodes.data(), octree_.triangles.data());
     write(writer, *root, 0, {1, 0});
     root.reset();
-    tree_.nodes = {};  // the rest of the octree takes its place in memory
+    // The rest of the octree takes its place in memory. Assignment of {} would keep it.
+    decltype(tree_.nodes)().swap(tree_.nodes);
     tbb::parallel_for(std::size_t{0}, jobs_.size(), [&](std::size_t i) { copy(jobs_[i]); });
     return true;
   }
