@@ -69,7 +69,7 @@ struct BinaryNode {
   float lower[3];
   std::uint32_t child;  // the pair of children, or kLeaf | triangle
   float upper[3];
-  std::uint32_t plan;  // as built: references below; collapse.cpp keeps its decisions here
+  std::uint32_t plan;  // as built: references below; plan.cpp keeps its decisions here
 
   bool leaf() const { return (child & kLeaf) != 0; }
   std::uint32_t triangle() const { return child & ~kLeaf; }

@@ -113,8 +113,7 @@ class Reinserter {
   }
 
   // The nodes of the largest surfaces: as none is larger than its parent, they are found from the
-  // root down. Children of the root cannot move.
-  // Links what it sees.
+  // root down. Children of the root cannot move. Sets the parents of what it sees.
   std::vector<Index> largest(std::size_t count) {
     using Entry = std::pair<float, Index>;
     std::vector<Entry> heap = {{nodes_[kRoot].half_area(), kRoot}};

@@ -9,8 +9,8 @@ namespace octrace::util {
 
 inline constexpr std::size_t kHugePage = std::size_t{2} << 20;
 
-// Fresh memory, which reads as zero, aligned to a huge page, and on huge pages where there are
-// several. Throws std::bad_alloc. unmap_huge() takes the same size.
+// Fresh memory, which reads as zero, aligned to a huge page, and on huge pages from 8 MiB on.
+// Throws std::bad_alloc. unmap_huge() takes the same size.
 void* map_huge(std::size_t bytes);
 void unmap_huge(void* memory, std::size_t bytes) noexcept;
 
