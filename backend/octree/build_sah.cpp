@@ -1,12 +1,14 @@
 // The SAH builders: a binary tree from above (top_tree.h, build_binary.h), improved by reinsertion
-// (reinsert.h), collapsed into eight-way nodes (collapse.h). Where reinsertion has nothing to gain,
-// the tree is never whole (build_subtrees.h).
+// (reinsert.h), collapsed into eight-way nodes (collapse.h). In large scenes where reinsertion has
+// nothing to gain, the tree is never whole (build_subtrees.h).
 #include "backend/octree/build_binary.h"
 #include "backend/octree/build_subtrees.h"
 #include "backend/octree/builders.h"
 #include "backend/octree/collapse.h"
 #include "backend/octree/reinsert.h"
 #include "backend/octree/top_tree.h"
+
+#include <stdexcept>
 
 namespace octrace::octree {
 
@@ -23,7 +25,7 @@ BinaryOptions quality_options() {
   return options;
 }
 
-// TopTree::overlap from which re-insertion is tried, which needs the whole binary tree: bunny,
+// TopTree::overlap from which re-insertion is worth the whole binary tree, which it needs: bunny,
 // terrain and soup have 0.001 to 0.006 and gain nothing from it, sponza has 0.24 and gains much.
 constexpr float kWorthMoving = 0.02f;
 
@@ -49,12 +51,17 @@ LooseReference* references_of(Octree& octree, std::size_t triangles) {
 }
 
 // False: too deep.
-bool build_fast(const BuildInput& input, std::uint32_t leaf_triangles, Octree& octree) {
+bool build_fast(const BuildInput& input, std::uint32_t leaf_triangles,
+                std::uint32_t least_for_subtrees, Octree& octree) {
   const TopOptions options;
   LooseReference* const references = references_of(octree, input.triangles.size());
-  const TopTree top = split_top(input, options, references);
-  if (top.subtrees.size() > 1 && top.overlap <= kWorthMoving) {
-    return build_subtrees(top, options, leaf_triangles, input, references, octree);
+  TopTree top = split_top(input, options, references);
+  if (input.triangles.size() >= least_for_subtrees && top.subtrees.size() > 1 &&
+      top.overlap <= kWorthMoving) {
+    if (build_subtrees(top, options, leaf_triangles, input, references, octree)) return true;
+    // Without forced roots of subtrees it may be less deep. Leaf triangles were written over the
+    // references.
+    top = split_top(input, options, references);
   }
   BinaryTree tree = build_below(top, options, references);
   reinsert(tree, reinsert_options(false));
@@ -71,25 +78,31 @@ bool build_quality(const BuildInput& input, std::uint32_t leaf_triangles, Octree
 
 }  // namespace
 
-void build_sah(const BuildInput& input, std::uint32_t leaf_triangles, bool quality,
-               Octree& octree) {
+void build_sah(const BuildInput& input, std::uint32_t leaf_triangles, bool quality, Octree& octree,
+               std::uint32_t least_for_subtrees) {
   if (input.triangles.empty()) return;
-  if ((quality ? build_quality : build_fast)(input, leaf_triangles, octree)) return;
-  // Too deep: halves by rank need at most 32 binary levels, so fewer eight-way ones.
+  if (quality ? build_quality(input, leaf_triangles, octree)
+              : build_fast(input, leaf_triangles, least_for_subtrees, octree)) {
+    return;
+  }
+  // Too deep: halves of fewer than 2^31 references by rank are at most 31 binary levels, and there
+  // are no more eight-way ones.
   TopOptions plain;
   plain.sah_depth = 0;
   LooseReference* const references = references_of(octree, input.triangles.size());
   const TopTree top = split_top(input, plain, references);
   BinaryTree tree = build_below(top, plain, references);
-  collapse(tree, leaf_triangles, input, octree);
+  if (!collapse(tree, leaf_triangles, input, octree)) {
+    throw std::logic_error("an octree of halves by rank is too deep");
+  }
 }
 
 std::uint64_t sah_build_bytes(std::uint64_t triangles, bool quality) {
   constexpr double kTree = 2 * sizeof(BinaryNode);
   const auto count = static_cast<double>(triangles);
   if (!quality) {
-    // Where re-insertion is tried; else nodes, of which there is one for six triangles or more, are
-    // held twice in place of the binary tree.
+    // Where the binary tree is made as a whole; else nodes, of which there is one for six triangles
+    // or more, are held twice in its place.
     constexpr double kDraft = sizeof(kernels::Node) / 6.0 + sizeof(std::uint32_t);
     return static_cast<std::uint64_t>(count * (sizeof(LooseReference) + kTree + kDraft));
   }

@@ -1,5 +1,6 @@
 // Scenes of several subtrees (backend/octree/top_tree.h): the ranges that threads take, and the
-// octrees made of them. The other tests' meshes are smaller than one subtree.
+// octrees made of them by either way, whole or in parts. The other tests' meshes are smaller than
+// one subtree.
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 #include <tbb/task_arena.h>
@@ -8,6 +9,7 @@
 #include <cmath>
 #include <cstring>
 #include <functional>
+#include <limits>
 
 #include "backend/octree/builders.h"
 #include "backend/octree/top_tree.h"
@@ -22,6 +24,8 @@ namespace {
 using kernels::Vec3;
 
 constexpr unsigned kThreads[] = {1, 2, 3, 8};
+// Triangles from which subtrees are built one by one: always; never.
+constexpr std::uint32_t kWays[] = {0, std::numeric_limits<std::uint32_t>::max()};
 
 using Corner = std::function<Vec3(std::uint32_t triangle, int corner, std::mt19937_64&)>;
 
@@ -47,7 +51,7 @@ Mesh make_dust(std::uint32_t count, float scale = 1.0f) {
   });
 }
 
-// From 5461 triangles on a scene has more than one range, of up to 8192 references; at 43696 the
+// From 5462 triangles on a scene has more than one range, of up to 8192 references; at 43696 the
 // ranges become smaller (subtree_size() in top_tree.cpp).
 std::vector<Mesh> large_meshes() {
   std::vector<Mesh> meshes;
@@ -89,6 +93,16 @@ std::vector<Mesh> large_meshes() {
 template <class T, class Allocator>
 bool same_bytes(const std::vector<T, Allocator>& a, const std::vector<T, Allocator>& b) {
   return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(T)) == 0;
+}
+
+octree::Octree build(const Mesh& mesh, std::uint32_t least_for_subtrees, unsigned threads = 1,
+                     std::uint32_t leaf = kernels::kMaxLeafTriangles) {
+  const octree::BuildInput input = mesh.input();
+  octree::Octree octree;
+  tbb::task_arena(static_cast<int>(threads)).execute([&] {
+    octree::build_sah(input, leaf, false, octree, least_for_subtrees);
+  });
+  return octree;
 }
 
 struct OctreeSubtrees : testing::TestWithParam<std::size_t> {
@@ -141,44 +155,75 @@ TEST_P(OctreeSubtrees, RangesHoldAllReferences) {
 }
 
 TEST_P(OctreeSubtrees, AreSoundAndTheSameForAnyThreadCount) {
-  octree::Octree expected;
-  for (const std::uint32_t leaf : {0u, 1u}) {
-    for (const unsigned threads : kThreads) {
-      octree::BuildOptions options;
-      options.threads = threads;
-      options.leaf = leaf;
-      util::Result<octree::Octree> octree = octree::build(mesh.input(), options);
-      ASSERT_TRUE(octree);
-      EXPECT_EQ(octree->triangles.size(), mesh.triangles.size());
-      if (threads == 1) {
-        const util::Result<void> ok = octree::verify(*octree, mesh.input());
-        ASSERT_TRUE(ok) << mesh.name << ": " << ok.error().to_string();
-        expected = std::move(*octree);
-        continue;
+  for (const std::uint32_t way : kWays) {
+    for (const std::uint32_t leaf : {std::uint32_t{kernels::kMaxLeafTriangles}, 1u}) {
+      octree::Octree expected;
+      for (const unsigned threads : kThreads) {
+        octree::Octree octree = build(mesh, way, threads, leaf);
+        EXPECT_EQ(octree.triangles.size(), mesh.triangles.size());
+        if (threads == 1) {
+          const util::Result<void> ok = octree::verify(octree, mesh.input());
+          ASSERT_TRUE(ok) << mesh.name << ": " << ok.error().to_string();
+          expected = std::move(octree);
+          continue;
+        }
+        EXPECT_TRUE(same_bytes(octree.nodes, expected.nodes)) << threads << " threads";
+        EXPECT_TRUE(same_bytes(octree.triangles, expected.triangles)) << threads << " threads";
       }
-      EXPECT_TRUE(same_bytes(octree->nodes, expected.nodes)) << threads << " threads";
-      EXPECT_TRUE(same_bytes(octree->triangles, expected.triangles)) << threads << " threads";
     }
   }
 }
 
 TEST_P(OctreeSubtrees, HitWhatBruteForceHits) {
-  const util::Result<octree::Octree> octree = octree::build(mesh.input(), {});
-  ASSERT_TRUE(octree);
-  kernels::SceneView view;
-  view.octree = octree->view();
+  const octree::Octree octrees[] = {build(mesh, kWays[0]), build(mesh, kWays[1])};
   const kernels::CpuTracer tracer;
   std::mt19937_64 random(seed());
   for (std::uint64_t i = 0; i < scaled(500); ++i) {
-    const kernels::Ray ray = random_ray(mesh, *octree, random);
+    const kernels::Ray ray = random_ray(mesh, octrees[i % 2], random);
     const kernels::Hit expected = brute_force(mesh.positions, mesh.triangles, ray);
-    kernels::Hit found;
-    ASSERT_EQ(kernels::TraceStatus::ok, tracer.closest(view, {}, ray, &found));
-    ASSERT_EQ(found.triangle, expected.triangle)
-        << mesh.name << ", seed " << seed() << ", ray " << i;
-    if (expected.valid()) {
-      ASSERT_EQ(0, std::memcmp(&found.t, &expected.t, sizeof(float)));
+    for (const octree::Octree& octree : octrees) {
+      kernels::SceneView view;
+      view.octree = octree.view();
+      kernels::Hit found;
+      ASSERT_EQ(kernels::TraceStatus::ok, tracer.closest(view, {}, ray, &found));
+      ASSERT_EQ(found.triangle, expected.triangle)
+          << mesh.name << ", seed " << seed() << ", ray " << i;
+      if (expected.valid()) {
+        ASSERT_EQ(0, std::memcmp(&found.t, &expected.t, sizeof(float)));
+      }
     }
+  }
+}
+
+TEST(OctreeOfDust, IsBuiltInPartsWhereItIsLarge) {
+  for (const std::uint32_t count : {octree::kLeastForSubtrees - 1, octree::kLeastForSubtrees}) {
+    const Mesh mesh = make_dust(count);
+    const util::Result<octree::Octree> octree = octree::build(mesh.input(), {});
+    ASSERT_TRUE(octree);
+    const bool large = count == octree::kLeastForSubtrees;
+    EXPECT_TRUE(same_bytes(octree->nodes, build(mesh, kWays[large ? 0 : 1]).nodes));
+    EXPECT_FALSE(same_bytes(octree->nodes, build(mesh, kWays[large ? 1 : 0]).nodes));
+  }
+}
+
+// Ever smaller triangles in a row, down to surfaces that vanish, of which an eight-way node takes
+// no more than two. Down to 2^-70 the way in parts is too deep and the whole tree is not; down to
+// 2^-71 both are, and halves by rank are left.
+TEST(OctreeOfAChain, FallsBackToTheWholeTreeAndThenToHalvesByRank) {
+  constexpr std::uint32_t kCount = 6000;
+  for (const int least : {-70, -71}) {
+    const Mesh mesh = make("chain", kCount, [&](std::uint32_t i, int c, std::mt19937_64&) {
+      const double steps = 62.0 - least;
+      const auto s = static_cast<float>(std::exp2(61.8 - steps * i / kCount));
+      return Vec3(c == 1 ? 1.001f * s : s, c == 2 ? 0.001f * s : 0.0f, c == 1 ? 0.001f * s : 0.0f);
+    });
+    const octree::Octree parts = build(mesh, kWays[0]), whole = build(mesh, kWays[1]);
+    const util::Result<void> ok = octree::verify(parts, mesh.input());
+    EXPECT_TRUE(ok) << ok.error().to_string();
+    EXPECT_TRUE(same_bytes(parts.nodes, whole.nodes));
+    EXPECT_TRUE(same_bytes(parts.triangles, whole.triangles));
+    // Halves of 6000 by rank end in leaves at the eleventh level.
+    EXPECT_EQ(octree::statistics(parts).depth, least == -70 ? 10u : 11u);
   }
 }
 
@@ -187,6 +232,10 @@ TEST(OctreeOfHugeTriangles, IsSound) {
   for (const float scale : {1e18f, 1e19f, 1e38f}) {
     for (const std::uint32_t count : {5u, 30u, 20000u}) {
       const Mesh mesh = make_dust(count, scale);
+      for (const std::uint32_t way : kWays) {
+        const util::Result<void> ok = octree::verify(build(mesh, way), mesh.input());
+        EXPECT_TRUE(ok) << scale << ", " << count << ": " << ok.error().to_string();
+      }
       for (const octree::Builder builder : {octree::Builder::sah, octree::Builder::quality}) {
         octree::BuildOptions options;
         options.builder = builder;
