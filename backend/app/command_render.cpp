@@ -30,6 +30,8 @@ using batch::Metadata;
 using batch::Output;
 
 struct RenderOptions {
+  bool stats_in_file() const { return !stats.empty() && stats != kStandardOutput; }
+
   SceneRequest scene;
   TimeOptions time;
   std::vector<std::string> outputs;
@@ -168,7 +170,7 @@ util::Result<void> check_apart(const RenderOptions& options, const std::vector<O
   if (!options.camera.empty()) taken.insert(resolved(options.camera));
   std::vector<std::string> written;
   for (const Output& output : outputs) written.push_back(output.path);
-  if (!options.stats.empty() && options.stats != kStandardOutput) written.push_back(options.stats);
+  if (options.stats_in_file()) written.push_back(options.stats);
   for (const std::string& path : written) {
     if (!taken.insert(resolved(path)).second) {
       return usage_error(fmt::format("{}: would replace another file of this command", path));
@@ -213,7 +215,7 @@ util::Result<Plan> make_plan(RenderOptions& options) {
     if (!writable) return writable.error();
   }
   if (util::Result<void> apart = check_apart(options, plan.outputs); !apart) return apart.error();
-  if (!options.stats.empty() && options.stats != kStandardOutput) {
+  if (options.stats_in_file()) {
     util::Result<void> writable = batch::check_writable(options.stats);
     if (!writable) return writable.error();
   }

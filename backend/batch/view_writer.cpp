@@ -76,7 +76,7 @@ ViewWriter::ViewWriter(const Plan& plan, Journal& journal, unsigned threads, std
   }
   const FramebufferCounts counts = framebuffer_counts(plan, threads);
   // Two more than processors: some wait for the disk, and then they hold no framebuffer.
-  const std::size_t writers = std::size_t{threads} + 2;
+  const std::uint64_t writers = std::min<std::uint64_t>(std::uint64_t{threads} + 2, views);
   // All at once: were they made when first needed, a late moment of slow writing would add one, and
   // memory would grow with the number of views.
   const ImageSize& size = plan.job().size;
@@ -85,7 +85,7 @@ ViewWriter::ViewWriter(const Plan& plan, Journal& journal, unsigned threads, std
         std::make_unique<render::Framebuffer>(size.width, size.height, plan.needed_aovs()));
   }
   spare_ = free_.size() - std::min(counts.steady, free_.size());
-  for (std::size_t i = 0; i < writers; ++i) {
+  for (std::uint64_t i = 0; i < writers; ++i) {
     try {
       threads_.emplace_back([this] { work(); });
     } catch (const std::system_error&) {  // no more threads are to be had

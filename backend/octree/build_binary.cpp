@@ -16,6 +16,7 @@
 
 #include "backend/octree/builders.h"
 #include "backend/octree/object_split.h"
+#include "backend/octree/reference_blocks.h"
 #include "backend/octree/spatial_split.h"
 #include "backend/util/huge_vector.h"
 
@@ -23,8 +24,7 @@ namespace octrace::octree {
 
 namespace {
 
-constexpr std::uint32_t kSubtree = 4096;  // references that one thread takes at once
-constexpr std::uint32_t kBlock = 4096;
+constexpr std::uint32_t kSubtree = 4096;     // references that one thread takes at once
 constexpr std::uint32_t kLeastSpatial = 32;  // references worth a spatial split
 
 // References [first, first + count) of an array, with room for `room` more after them. The range
@@ -70,21 +70,15 @@ class BinaryBuilder {
   }
 
  private:
+  // Joined in the order of fixed blocks: which of 0 and -0 is the lesser depends on the order.
   Bounds8 bounds_of(const Reference* references, std::uint32_t count) const {
-    if (count <= 2 * kBlock) return splitter_.bounds(references, count);
-    return tbb::parallel_reduce(
-        tbb::blocked_range<std::uint32_t>(0, count, kBlock), Bounds8(),
-        [&](const auto& r, const Bounds8& sum) {
-          return joined(sum, splitter_.bounds(references + r.begin(), r.size()));
-        },
-        joined);
-  }
-  static Bounds8 joined(Bounds8 a, const Bounds8& b) {
-    for (int i = 0; i < 8; ++i) {
-      a.box[i] = std::min(a.box[i], b.box[i]);
-      a.centres[i] = std::min(a.centres[i], b.centres[i]);
-    }
-    return a;
+    std::vector<Bounds8> bounds(blocks_of(count));
+    for_blocks(count, [&](std::uint32_t block, std::uint32_t first, std::uint32_t own) {
+      bounds[block] = splitter_.bounds(references + first, own);
+    });
+    Bounds8 all;
+    for (const Bounds8& block : bounds) all = joined(all, block);
+    return all;
   }
 
   // A subtree that no spatial split can help: neither it nor anything below it is large enough.
@@ -231,19 +225,6 @@ class BinaryBuilder {
     std::uint32_t lower = 0, upper = 0;
   };
 
-  // Calls body(block, first, count) for runs of references, at the same time.
-  template <class Body>
-  static void for_blocks(std::uint32_t count, const Body& body) {
-    const std::uint32_t blocks = (count + kBlock - 1) / kBlock;
-    const auto run = [&](std::uint32_t block) {
-      body(block, block * kBlock, std::min(kBlock, count - block * kBlock));
-    };
-    if (blocks == 1) {
-      run(0);
-    } else {
-      tbb::parallel_for(0u, blocks, run);
-    }
-  }
   // From how many each block sends to either side to where its first ones go; returns all.
   static Counts sum_up(std::vector<Counts>& counts) {
     Counts sum;
@@ -258,7 +239,7 @@ class BinaryBuilder {
 
   void scatter(const Range& range, const Reference* from, const ObjectSplit& split,
                const Binning& binning, Reference* to, Sides& sides) const {
-    std::vector<Counts> counts((range.count + kBlock - 1) / kBlock);
+    std::vector<Counts> counts(blocks_of(range.count));
     for_blocks(range.count, [&](std::uint32_t block, std::uint32_t first, std::uint32_t count) {
       const std::uint32_t lower = splitter_.count_lower(from + first, count, binning, split);
       counts[block] = {lower, count - lower};
@@ -286,7 +267,7 @@ class BinaryBuilder {
   // False: not enough room for the parts, or nothing gained.
   bool cut_all(const Range& range, const Reference* from, const SpatialSplit& split, Reference* to,
                Sides& sides) const {
-    std::vector<Counts> counts((range.count + kBlock - 1) / kBlock);
+    std::vector<Counts> counts(blocks_of(range.count));
     for_blocks(range.count, [&](std::uint32_t block, std::uint32_t first, std::uint32_t count) {
       for (std::uint32_t i = first; i < first + count; ++i) {
         const Side side = place(from[i], split, nullptr, nullptr);

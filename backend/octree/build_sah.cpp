@@ -1,14 +1,14 @@
 // The SAH builders: a binary tree from above (top_tree.h, build_binary.h), improved by reinsertion
 // (reinsert.h), collapsed into eight-way nodes (collapse.h). In large scenes where reinsertion has
 // nothing to gain, the tree is never whole (build_subtrees.h).
+#include <stdexcept>
+
 #include "backend/octree/build_binary.h"
 #include "backend/octree/build_subtrees.h"
 #include "backend/octree/builders.h"
 #include "backend/octree/collapse.h"
 #include "backend/octree/reinsert.h"
 #include "backend/octree/top_tree.h"
-
-#include <stdexcept>
 
 namespace octrace::octree {
 
