@@ -9,7 +9,6 @@
 #include "backend/app/command.h"
 #include "backend/app/options.h"
 #include "backend/app/preload.h"
-#include "backend/batch/finish.h"
 #include "backend/batch/plan.h"
 #include "backend/batch/results.h"
 #include "backend/batch/runner.h"
@@ -115,7 +114,9 @@ Result<util::Exit> dry_run(const batch::Plan& plan, const BatchRequest& request)
     }
     for (const batch::Output& file : plan.files(plan.view(index))) fmt::print("{}\n", file.path);
   }
-  for (const batch::JobScene& scene : plan.job().scenes) {
+  for (std::size_t i = 0; i < plan.job().scenes.size(); ++i) {
+    if (plan.first_view(i) >= end || plan.first_view(i + 1) <= begin) continue;
+    const batch::JobScene& scene = plan.job().scenes[i];
     std::error_code error;
     if (!scene.source.starts_with(scene::kBuiltinPrefix) &&
         !std::filesystem::exists(scene.source, error)) {
@@ -175,11 +176,8 @@ Result<util::Exit> run_batch(BatchRequest request) {
   if (!summary) return summary.error();
   progress.finish(summary->standing);
   tell(*plan, *summary);
-  if (summary->interrupted) util::acknowledge_interrupt();
-  const auto finished = batch::write_results(*plan, request.run, *summary);
   if (summary->fatal) return *summary->fatal;
   if (summary->interrupted) return util::Error{util::Exit::io, "", "interrupted", "", ""};
-  if (!finished) return finished.error();
   return summary->standing.failed > 0 ? util::Exit::partial : util::Exit::ok;
 }
 

@@ -231,6 +231,7 @@ Result<JobResults> merge_job(const Plan& plan, const util::Limits& limits, doubl
   auto lock = RunLock::acquire(plan.folder(), Shard(), {wait_lock, true});
   if (!lock) return lock.error();
   if (auto same = check_same_job(plan, plan.meaning(limits)); !same) return same.error();
+  remove_result_leftovers(plan);  // of a merge that was killed
   auto results = write_job_results(plan);
   if (!results) return results.error();
   // Last: who finds it finds the others.

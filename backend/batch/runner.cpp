@@ -11,6 +11,7 @@
 
 #include "backend/batch/camera_choice.h"
 #include "backend/batch/camera_sets.h"
+#include "backend/batch/finish.h"
 #include "backend/batch/hash.h"
 #include "backend/batch/next_frame.h"
 #include "backend/batch/scene_session.h"
@@ -344,14 +345,18 @@ Result<RunSummary> run_plan(const Plan& plan, const RunOptions& options) {
     image::request_threads(1);  // writers run side by side: a thread each is enough
     Run(plan, options, *done, *journal, summary).run();
   }
+  if (summary.interrupted) util::acknowledge_interrupt();
+  // Before the journal's last line: a run that is killed here has not ended in good order, and the
+  // next one looks for what it left.
+  auto ended = write_results(plan, options, summary);
   const ordered_json last = {{"kind", "end"},
                              {"seconds", summary.standing.seconds},
                              {"done", summary.standing.done},
                              {"failed", summary.standing.failed},
                              {"interrupted", summary.interrupted}};
-  auto ended = append(*journal, last);
+  if (auto appended = append(*journal, last); ended) ended = appended;
   if (auto flushed = journal->flush(); ended) ended = flushed;
-  if (!ended && !summary.fatal) summary.fatal = ended.error();
+  if (!ended && !summary.fatal && !summary.interrupted) summary.fatal = ended.error();
   return summary;
 }
 

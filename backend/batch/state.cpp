@@ -106,6 +106,41 @@ Result<ordered_json> read_header(const std::string& path) {
   return header;
 }
 
+// Temporary files of some outputs that nobody is making.
+class Leftovers {
+ public:
+  void add(const std::string& path) {
+    targets_.push_back(hash_text(path));
+    std::string folder = path.substr(0, path.rfind('/') + 1);  // npos + 1 is 0: no folder
+    if (folders_.empty() || *folders_.rbegin() != folder) folders_.insert(std::move(folder));
+  }
+  void add_results(const Plan& plan) {
+    for (const char* name : {"summary.json", "cameras.json", "objects.json", "annotations.json"}) {
+      add(plan.folder() + name);
+    }
+  }
+  void remove() {
+    std::sort(targets_.begin(), targets_.end());
+    for (const std::string& folder : folders_) {
+      std::error_code error;
+      const std::string place = folder.empty() ? "." : folder;
+      for (const auto& entry : std::filesystem::directory_iterator(place, error)) {
+        const auto target = util::target_of_temporary(entry.path().filename().string());
+        if (!target ||
+            !std::binary_search(targets_.begin(), targets_.end(), hash_text(folder + *target))) {
+          continue;
+        }
+        std::error_code ignored;
+        std::filesystem::remove(entry.path(), ignored);
+      }
+    }
+  }
+
+ private:
+  std::vector<std::uint64_t> targets_;  // hashes of their paths
+  std::set<std::string> folders_;
+};
+
 }  // namespace
 
 std::string state_folder(const std::string& output_folder) { return output_folder + ".octrace/"; }
@@ -221,46 +256,26 @@ Result<void> forget(const Plan& plan, const ordered_json& meaning, const Shard& 
 }
 
 void remove_leftovers(const Plan& plan, const Shard& shard) {
-  std::vector<std::uint64_t> targets;  // hashes of this shard's paths
-  std::set<std::string> folders;
-  const auto folder_of = [](const std::string& path) {
-    return path.substr(0, path.rfind('/') + 1);  // npos + 1 is 0: no folder
-  };
-  const auto add = [&](const std::string& path) {
-    targets.push_back(hash_text(path));
-    std::string folder = folder_of(path);
-    if (folders.empty() || *folders.rbegin() != folder) folders.insert(std::move(folder));
-  };
+  Leftovers leftovers;
   const auto [begin, end] = plan.part(shard);
   if (plan.job().pack && begin < end) {
     for (std::uint64_t i = plan.pack_of(begin); i <= plan.pack_of(end - 1); ++i) {
-      add(plan.pack_path(i));
+      leftovers.add(plan.pack_path(i));
     }
   } else {
     for (std::uint64_t index = begin; index < end; ++index) {
-      for (const Output& file : plan.files(plan.view(index))) add(file.path);
+      for (const Output& file : plan.files(plan.view(index))) leftovers.add(file.path);
     }
   }
-  add(shard_summary_path(plan.folder(), shard));
-  if (shard.count == 1) {
-    for (const char* name : {"summary.json", "cameras.json", "objects.json", "annotations.json"}) {
-      add(plan.folder() + name);
-    }
-  }
-  std::sort(targets.begin(), targets.end());
-  for (const std::string& folder : folders) {
-    std::error_code error;
-    const std::string place = folder.empty() ? "." : folder;
-    for (const auto& entry : std::filesystem::directory_iterator(place, error)) {
-      const auto target = util::target_of_temporary(entry.path().filename().string());
-      if (!target ||
-          !std::binary_search(targets.begin(), targets.end(), hash_text(folder + *target))) {
-        continue;
-      }
-      std::error_code ignored;
-      std::filesystem::remove(entry.path(), ignored);
-    }
-  }
+  leftovers.add(shard_summary_path(plan.folder(), shard));
+  if (shard.count == 1) leftovers.add_results(plan);
+  leftovers.remove();
+}
+
+void remove_result_leftovers(const Plan& plan) {
+  Leftovers leftovers;
+  leftovers.add_results(plan);
+  leftovers.remove();
 }
 
 }  // namespace octrace::batch

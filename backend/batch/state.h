@@ -70,5 +70,7 @@ util::Result<void> forget(const Plan& plan, const nlohmann::ordered_json& meanin
 
 // Removes temporary files that a killed run of this shard left, and no other's.
 void remove_leftovers(const Plan& plan, const Shard& shard);
+// The same for the files that are made from all journals.
+void remove_result_leftovers(const Plan& plan);
 
 }  // namespace octrace::batch
