@@ -72,7 +72,8 @@ util::Result<void> write_npy(const std::string& path, const Array& array) {
   return file->commit();
 }
 
-util::Result<void> write_npz(const std::string& path, std::span<const Array> arrays, int level) {
+util::Result<void> write_npz(const std::string& path, std::span<const Array> arrays,
+                             Packing packing) {
   util::Result<util::OutputFile> file = util::OutputFile::create(path);
   if (!file) return file.error();
   ZipWriter zip(*file);
@@ -81,7 +82,7 @@ util::Result<void> write_npz(const std::string& path, std::span<const Array> arr
     if (!data) return too_large(path, array);
     const std::string header = header_of(array);
     const std::array<std::string_view, 2> parts = {header, *data};
-    if (auto ok = zip.add(array.name + ".npy", parts, level); !ok) return ok;
+    if (auto ok = zip.add(array.name + ".npy", parts, packing); !ok) return ok;
   }
   if (auto ok = zip.finish(); !ok) return ok;
   return file->commit();

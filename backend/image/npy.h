@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "backend/image/zip.h"
 #include "backend/util/result.h"
 
 namespace octrace::image {
@@ -22,7 +23,8 @@ struct Array {
 
 // Whole or absent (backend/util/atomic_file.h). Exit 5 where writing fails.
 util::Result<void> write_npy(const std::string& path, const Array& array);
-// level: 0 stores, as numpy.savez does, 1 to 9 deflate, as numpy.savez_compressed.
-util::Result<void> write_npz(const std::string& path, std::span<const Array> arrays, int level);
+// Stored, as numpy.savez does, or deflated, as numpy.savez_compressed.
+util::Result<void> write_npz(const std::string& path, std::span<const Array> arrays,
+                             Packing packing);
 
 }  // namespace octrace::image

@@ -2,7 +2,7 @@
 
 #include <zlib.h>
 
-#include <algorithm>
+#include "backend/image/deflate.h"
 
 namespace octrace::image {
 
@@ -46,11 +46,11 @@ std::uint32_t crc_of(std::uint32_t crc, std::string_view bytes) {
 }  // namespace
 
 util::Result<void> ZipWriter::add(std::string_view name, std::span<const std::string_view> parts,
-                                  int level) {
+                                  Packing packing) {
   if (name.size() > 0xffff) return zip_error("a name is too long");
   Member member;
   member.name = name;
-  member.method = level == 0 ? kStored : kDeflated;
+  member.method = packing == Packing::stored ? kStored : kDeflated;
   member.offset = file_.size();
   for (const std::string_view part : parts) member.size += part.size();
   // What does not compress grows by 5 bytes a block of 16383 or more; 1/64 bounds that amply.
@@ -68,7 +68,8 @@ util::Result<void> ZipWriter::add(std::string_view name, std::span<const std::st
   };
   if (auto ok = file_.append(header()); !ok) return ok;
   const std::uint64_t begin = file_.size();
-  if (auto ok = level == 0 ? store(parts, member) : deflate(parts, level, member); !ok) return ok;
+  auto packed = packing == Packing::stored ? store(parts, member) : deflate(parts, member);
+  if (!packed) return packed;
   member.packed = file_.size() - begin;
   if (auto ok = file_.patch(member.offset, header()); !ok) return ok;
   members_.push_back(std::move(member));
@@ -83,42 +84,9 @@ util::Result<void> ZipWriter::store(std::span<const std::string_view> parts, Mem
   return {};
 }
 
-util::Result<void> ZipWriter::deflate(std::span<const std::string_view> parts, int level,
-                                      Member& member) {
-  z_stream stream{};
-  // -15: a raw stream, without zlib's own header.
-  if (::deflateInit2(&stream, level, Z_DEFLATED, -15, 8, Z_DEFAULT_STRATEGY) != Z_OK) {
-    return util::Error{util::Exit::limit, "", "out of memory for compression", "", ""};
-  }
-  std::string packed(1 << 18, '\0');
-  util::Result<void> outcome;
-  const auto run = [&](int flush) {
-    do {
-      stream.next_out = reinterpret_cast<Bytef*>(packed.data());
-      stream.avail_out = static_cast<uInt>(packed.size());
-      if (::deflate(&stream, flush) == Z_STREAM_ERROR) {
-        outcome = zip_error("compression failed");
-        return false;
-      }
-      outcome = file_.append(std::string_view(packed.data(), packed.size() - stream.avail_out));
-      if (!outcome) return false;
-    } while (stream.avail_out == 0);
-    return true;
-  };
-  bool going = true;
-  for (std::string_view part : parts) {
-    member.crc = crc_of(member.crc, part);
-    while (going && !part.empty()) {
-      const std::size_t count = std::min<std::size_t>(part.size(), 1 << 30);  // avail_in is 32 bits
-      stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(part.data()));
-      stream.avail_in = static_cast<uInt>(count);
-      going = run(Z_NO_FLUSH);
-      part.remove_prefix(count);
-    }
-  }
-  if (going) run(Z_FINISH);
-  ::deflateEnd(&stream);
-  return outcome;
+util::Result<void> ZipWriter::deflate(std::span<const std::string_view> parts, Member& member) {
+  for (const std::string_view part : parts) member.crc = crc_of(member.crc, part);
+  return image::deflate(parts, [this](std::string_view piece) { return file_.append(piece); });
 }
 
 util::Result<void> ZipWriter::finish() {

@@ -12,6 +12,8 @@
 
 namespace octrace::image {
 
+enum class Packing { stored, deflated };
+
 class ZipWriter {
  public:
   // Sizes, offsets and counts from these on use ZIP64; readers take such records anywhere, and
@@ -25,9 +27,10 @@ class ZipWriter {
   ZipWriter(util::OutputFile& file, const Zip64From& zip64_from)
       : file_(file), zip64_from_(zip64_from) {}
 
-  // The parts one after another as one member; level 0 stores, 1 to 9 deflate. Members have no
-  // date, so that equal content is an equal archive. The name: ASCII, 65535 bytes at most.
-  util::Result<void> add(std::string_view name, std::span<const std::string_view> parts, int level);
+  // The parts one after another as one member. Members have no date, so that equal content is an
+  // equal archive. The name: ASCII, 65535 bytes at most.
+  util::Result<void> add(std::string_view name, std::span<const std::string_view> parts,
+                         Packing packing);
   util::Result<void> finish();  // the directory at the end; the caller commits the file
 
  private:
@@ -38,7 +41,7 @@ class ZipWriter {
     std::uint64_t size = 0, packed = 0, offset = 0;
   };
   util::Result<void> store(std::span<const std::string_view> parts, Member& member);
-  util::Result<void> deflate(std::span<const std::string_view> parts, int level, Member& member);
+  util::Result<void> deflate(std::span<const std::string_view> parts, Member& member);
 
   util::OutputFile& file_;
   Zip64From zip64_from_;

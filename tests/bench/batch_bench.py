@@ -172,7 +172,10 @@ def kill(arguments, folder):
 
 
 def blender(arguments, folder):
-    job = write_job(arguments, folder, 10, "out/{camera}.exr")
+    subprocess.run([arguments.octrace, "export", SCENE, "--to", "gltf", "-o", folder + "/glb"],
+                   check=True, stdout=subprocess.DEVNULL)
+    glb = [os.path.join(folder, "glb", n) for n in os.listdir(folder + "/glb") if n.endswith(".glb")][0]
+    job = write_job(arguments, folder, 10, "out/{camera}.exr", scenes=[glb])
     shutil.rmtree(os.path.join(folder, "out"), True)
     times = [run(arguments, job)[0] for _ in range(5)]
     poses = []
@@ -180,9 +183,6 @@ def blender(arguments, folder):
         for line in map(json.loads, file):
             if line["kind"] == "view":
                 poses.append((line["lens"]["matrix"], line["lens"]["yfov"]))
-    subprocess.run([arguments.octrace, "export", SCENE, "--to", "gltf", "-o", folder + "/glb"],
-                   check=True, stdout=subprocess.DEVNULL)
-    glb = [os.path.join(folder, "glb", n) for n in os.listdir(folder + "/glb") if n.endswith(".glb")][0]
     script = os.path.join(folder, "views.py")
     with open(script, "w") as file:
         file.write(BLENDER)

@@ -10,6 +10,10 @@ octrace_test(image_npy_test
   SOURCES image_npy.cpp zip_reader.cpp
   LIBRARIES GTest::gmock octrace_image octrace_util ZLIB::ZLIB fmt::fmt
   LABELS unit)
+octrace_test(image_deflate_test
+  SOURCES image_deflate.cpp
+  LIBRARIES octrace_image octrace_util ZLIB::ZLIB ${CMAKE_DL_LIBS}
+  LABELS unit)
 # Part of the module as well.
 octrace_test(image_file_proxy_test
   SOURCES image_file_proxy.cpp ${CMAKE_SOURCE_DIR}/backend/image/file_proxy.cpp

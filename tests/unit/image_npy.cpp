@@ -19,6 +19,7 @@ namespace {
 
 using image::Array;
 using image::ArrayType;
+using image::Packing;
 using ::testing::HasSubstr;
 
 class Npy : public ::testing::Test {
@@ -88,8 +89,8 @@ TEST_F(Npy, AnArchiveHoldsEveryArrayStoredOrDeflated) {
                                      {"object_id", ArrayType::uint32, {531, 37}, flat.data()},
                                      {"none", ArrayType::uint32, {0, 37}, flat.data()}};
   std::vector<std::uintmax_t> sizes;
-  for (const int level : {0, 1, 9}) {
-    ASSERT_TRUE(image::write_npz(path("a.npz"), arrays, level));
+  for (const Packing packing : {Packing::stored, Packing::deflated}) {
+    ASSERT_TRUE(image::write_npz(path("a.npz"), arrays, packing));
     const auto members = read_zip(content("a.npz"));
     ASSERT_EQ(members.size(), 3u);
     EXPECT_EQ(split(members.at("N.npy")).second, bytes_of(noise));
@@ -103,8 +104,8 @@ TEST_F(Npy, AnArchiveHoldsEveryArrayStoredOrDeflated) {
 TEST_F(Npy, EqualArraysAreEqualFiles) {
   const std::vector<float> values = {1, 2, 3};
   const std::vector<Array> arrays = {{"a", ArrayType::float32, {3}, values.data()}};
-  ASSERT_TRUE(image::write_npz(path("a.npz"), arrays, 1));
-  ASSERT_TRUE(image::write_npz(path("b.npz"), arrays, 1));
+  ASSERT_TRUE(image::write_npz(path("a.npz"), arrays, Packing::deflated));
+  ASSERT_TRUE(image::write_npz(path("b.npz"), arrays, Packing::deflated));
   EXPECT_EQ(content("a.npz"), content("b.npz"));
 }
 
@@ -119,11 +120,11 @@ TEST_F(Npy, Zip64RecordsHoldSizesOffsetsAndCounts) {
   for (const Case& c :
        {Case{{0, 0}, "everything"}, Case{{500, 0xffff}, "sizes"},
         Case{{1500, 2}, "late offsets and the count"}, Case{{100, 3}, "all sizes"}}) {
-    for (const int level : {0, 6}) {
+    for (const Packing packing : {Packing::stored, Packing::deflated}) {
       auto file = util::OutputFile::create(path("a.zip"));
       ASSERT_TRUE(file);
       image::ZipWriter zip(*file, c.from);
-      for (const char* name : {"a", "b", "c"}) ASSERT_TRUE(zip.add(name, parts, level));
+      for (const char* name : {"a", "b", "c"}) ASSERT_TRUE(zip.add(name, parts, packing));
       ASSERT_TRUE(zip.finish());
       ASSERT_TRUE(file->commit());
       const auto members = read_zip(content("a.zip"));
@@ -140,7 +141,7 @@ TEST_F(Npy, Zip64RecordsHoldSizesOffsetsAndCounts) {
 }
 
 TEST_F(Npy, AnEmptyArchiveIsOne) {
-  ASSERT_TRUE(image::write_npz(path("a.npz"), {}, 1));
+  ASSERT_TRUE(image::write_npz(path("a.npz"), {}, Packing::deflated));
   EXPECT_TRUE(read_zip(content("a.npz")).empty());
 }
 
@@ -169,8 +170,8 @@ TEST_F(Npy, NumpyLoadsThem) {
   const std::vector<Array> arrays = {{"N", ArrayType::float32, {4, 5, 3}, values.data()},
                                      {"object_id", ArrayType::uint32, {3, 1}, id.data()},
                                      {"mask", ArrayType::boolean, {2, 2}, mask.data()}};
-  ASSERT_TRUE(image::write_npz(path("a.npz"), arrays, 1));
-  ASSERT_TRUE(image::write_npz(path("b.npz"), arrays, 0));
+  ASSERT_TRUE(image::write_npz(path("a.npz"), arrays, Packing::deflated));
+  ASSERT_TRUE(image::write_npz(path("b.npz"), arrays, Packing::stored));
   ASSERT_TRUE(image::write_npy(path("n.npy"), arrays[0]));
   std::ofstream(path("check.py")) << R"(
 import numpy as np, sys
