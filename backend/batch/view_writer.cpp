@@ -108,8 +108,9 @@ std::unique_ptr<render::Framebuffer> ViewWriter::acquire() {
 
 void ViewWriter::give_back(std::unique_ptr<render::Framebuffer> framebuffer) {
   const std::lock_guard lock(mutex_);
-  free_.push_back(std::move(framebuffer));
   writing_ = true;
+  if (closed_) return;  // freed once the lock is, beside other views that are still written
+  free_.push_back(std::move(framebuffer));
   changed_.notify_all();
 }
 
@@ -122,8 +123,10 @@ void ViewWriter::submit(TracedView view) {
 void ViewWriter::finish() {
   if (threads_.empty()) return;
   {
+    std::vector<std::unique_ptr<render::Framebuffer>> unused;
     const std::lock_guard lock(mutex_);
     closed_ = true;
+    unused.swap(free_);
     changed_.notify_all();
   }
   for (std::thread& thread : threads_) thread.join();
