@@ -4,7 +4,9 @@
 #include <gtest/gtest.h>
 #include <zlib.h>
 
+#include <atomic>
 #include <string>
+#include <thread>
 #include <vector>
 
 namespace octrace::test {
@@ -21,10 +23,11 @@ std::string noise(std::size_t size) {
 }
 
 // A plane: background, and a surface whose depth changes slowly.
-std::string depths(std::size_t pixels) {
+std::string depths(std::size_t pixels, std::uint32_t seed = 0) {
   std::vector<float> plane(pixels, 1e10f);
   for (std::size_t i = pixels / 3; i < pixels; ++i) {
-    plane[i] = 20.0f + static_cast<float>(i % 640) * 0.01f;
+    seed = seed * 1664525u + 1013904223u;
+    plane[i] = 20.0f + static_cast<float>(i % 640) * 0.01f + static_cast<float>(seed >> 28) * 1e-5f;
   }
   return {reinterpret_cast<const char*>(plane.data()), pixels * 4};
 }
@@ -84,11 +87,25 @@ TEST(Deflate, PartsAreOneStream) {
   EXPECT_EQ(inflated(deflated({}), 0), "");
 }
 
+// In any thread, after any other stream, and wherever memory is.
 TEST(Deflate, EqualPartsAreEqualStreams) {
-  const std::string sample = depths(300000);
-  const std::string first = deflated({sample});
-  deflated({noise(100000)});
-  EXPECT_EQ(deflated({sample}), first);
+  std::vector<std::string> inputs, streams;
+  for (std::uint32_t i = 0; i < 60; ++i) {
+    inputs.push_back(depths(20000, i) + noise(i * 100));
+    streams.push_back(deflated({inputs.back()}));
+  }
+  std::atomic<int> different{0};
+  std::vector<std::thread> threads;
+  for (std::size_t thread = 0; thread < 16; ++thread) {
+    threads.emplace_back([&, thread] {
+      for (std::size_t i = 0; i < inputs.size(); ++i) {
+        const std::size_t at = (i * 7 + thread) % inputs.size();
+        different += deflated({inputs[at]}) != streams[at];
+      }
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+  EXPECT_EQ(different, 0);
 }
 
 TEST(Deflate, AnErrorOfTheSinkEndsIt) {
