@@ -1,12 +1,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <bit>
 #include <chrono>
 #include <fstream>
+#include <limits>
 #include <mutex>
 #include <vector>
 
 #include "backend/octree/wide.h"
+#include "backend/render/outline.h"
 #include "backend/render/renderer.h"
 #include "backend/render/tiles.h"
 #include "kernels/cpu/intersect.h"
@@ -43,6 +46,7 @@ struct View {
   const kernels::RayCamera& camera;
   const kernels::RenderParams& params;
   kernels::FramebufferView target;
+  const Outline& outline;
   bool geometry, beauty;
   const kernels::MotionView* motion;  // null: no motion plane
 };
@@ -78,24 +82,66 @@ TileFailure visit_pixels(const Tile& tile, const Visit& visit) {
   return {};
 }
 
-// The planes of `kKept` for the pixels of a tile, from its rays and hits in the order of
+// Calls visit(x, y) for the pixels of the blocks, in order, until it fails.
+template <class Visit>
+TileFailure visit_pixels(const std::vector<Tile>& blocks, const Visit& visit) {
+  for (const Tile& block : blocks) {
+    const TileFailure failure = visit_pixels(block, visit);
+    if (failure.status != TraceStatus::ok) return failure;
+  }
+  return {};
+}
+
+// What store_background() writes, for all pixels of the block.
+void fill_background(const View& view, const Tile& block) {
+  constexpr auto kFar = std::bit_cast<std::uint32_t>(std::numeric_limits<float>::infinity());
+  for (const AovInfo& info : aov_table()) {
+    auto* const plane = static_cast<std::uint32_t*>(view.target.planes[static_cast<int>(info.aov)]);
+    if (plane == nullptr || info.aov == Aov::beauty) continue;
+    const bool far = info.aov == Aov::depth || info.aov == Aov::distance;
+    const auto channels = static_cast<std::uint64_t>(info.channel_count);
+    for (std::uint32_t y = block.y0; y < block.y1; ++y) {
+      std::fill_n(plane + view.target.pixel(block.x0, y) * channels,
+                  (block.x1 - block.x0) * channels, far ? kFar : 0u);
+    }
+  }
+}
+
+// The blocks of the tile that may see something; the others become background.
+std::vector<Tile> fill_what_sees_nothing(const View& view, const Tile& tile) {
+  constexpr std::uint32_t kBlock = 16;
+  std::vector<Tile> left;
+  for (std::uint32_t y = tile.y0; y < tile.y1; y += kBlock) {
+    for (std::uint32_t x = tile.x0; x < tile.x1; x += kBlock) {
+      const Tile block{x, y, std::min(x + kBlock, tile.x1), std::min(y + kBlock, tile.y1)};
+      if (view.outline.may_see(block)) {
+        left.push_back(block);
+      } else {
+        fill_background(view, block);
+      }
+    }
+  }
+  return left;
+}
+
+// The planes of `kKept` for the pixels of some blocks, from their rays and hits in the order of
 // visit_pixels().
 template <Aov... kKept, class Motion = kernels::NoMotion>
 void store_planes(const View& view, const kernels::SceneView& scene,
                   const std::vector<kernels::Ray>& rays, const std::vector<kernels::Hit>& hits,
-                  const Tile& tile, const Motion& motion = {}) {
+                  const std::vector<Tile>& blocks, const Motion& motion = {}) {
   const kernels::PlanesOf<kKept...> planes{view.target};
   if (!planes.any()) return;
   std::size_t next = 0;
-  visit_pixels(tile, [&](std::uint32_t x, std::uint32_t y) {
+  visit_pixels(blocks, [&](std::uint32_t x, std::uint32_t y) {
     store_geometry(scene, rays[next], hits[next], planes, x, y, motion);
     ++next;
     return TraceStatus::ok;
   });
 }
 
-void camera_rays(const kernels::RayCamera& camera, const Tile& tile,
-                 std::vector<kernels::Ray>& rays) {
+std::vector<kernels::Ray> camera_rays(const kernels::RayCamera& camera, const Tile& tile,
+                                      const std::vector<Tile>& blocks) {
   std::vector<kernels::CameraRayPart> columns, rows;
   for (std::uint32_t x = tile.x0; x < tile.x1; ++x) {
     columns.push_back(camera_column(camera, static_cast<float>(x) + 0.5f));
@@ -103,39 +149,44 @@ void camera_rays(const kernels::RayCamera& camera, const Tile& tile,
   for (std::uint32_t y = tile.y0; y < tile.y1; ++y) {
     rows.push_back(camera_row(camera, static_cast<float>(y) + 0.5f));
   }
-  rays.resize(columns.size() * rows.size());
+  std::size_t count = 0;
+  for (const Tile& block : blocks)
+    count += std::size_t{block.x1 - block.x0} * (block.y1 - block.y0);
+  std::vector<kernels::Ray> rays(count);
   std::size_t next = 0;
-  visit_pixels(tile, [&](std::uint32_t x, std::uint32_t y) {
+  visit_pixels(blocks, [&](std::uint32_t x, std::uint32_t y) {
     rays[next++] = camera_ray(camera, columns[x - tile.x0], rows[y - tile.y0]);
     return TraceStatus::ok;
   });
+  return rays;
 }
 
 // The rays of a tile are traced together, because neighbours meet the same nodes.
 TileFailure trace_geometry_tile(const View& view, const kernels::SceneView& scene,
                                 const kernels::CpuTracer& tracer, const Tile& tile) {
-  std::vector<kernels::Ray> rays;
-  camera_rays(view.camera, tile, rays);
+  const std::vector<Tile> blocks = fill_what_sees_nothing(view, tile);
+  if (blocks.empty()) return {};
+  const std::vector<kernels::Ray> rays = camera_rays(view.camera, tile, blocks);
   std::vector<kernels::Hit> hits(rays.size());
   const TraceStatus status = tracer.closest_coherent(
       scene, view.params, rays.data(), static_cast<std::uint32_t>(rays.size()), hits.data());
   if (status != TraceStatus::ok) {  // one by one, to say which pixel it is
-    return visit_pixels(tile, [&](std::uint32_t x, std::uint32_t y) {
+    return visit_pixels(blocks, [&](std::uint32_t x, std::uint32_t y) {
       return geometry_pixel(view, scene, tracer, x, y);
     });
   }
-  store_planes<Aov::depth>(view, scene, rays, hits, tile);
-  store_planes<Aov::distance>(view, scene, rays, hits, tile);
-  store_planes<Aov::mask>(view, scene, rays, hits, tile);
-  store_planes<Aov::barycentric>(view, scene, rays, hits, tile);
-  store_planes<Aov::object_id>(view, scene, rays, hits, tile);
-  store_planes<Aov::material_id>(view, scene, rays, hits, tile);
-  store_planes<Aov::primitive_id>(view, scene, rays, hits, tile);
+  store_planes<Aov::depth>(view, scene, rays, hits, blocks);
+  store_planes<Aov::distance>(view, scene, rays, hits, blocks);
+  store_planes<Aov::mask>(view, scene, rays, hits, blocks);
+  store_planes<Aov::barycentric>(view, scene, rays, hits, blocks);
+  store_planes<Aov::object_id>(view, scene, rays, hits, blocks);
+  store_planes<Aov::material_id>(view, scene, rays, hits, blocks);
+  store_planes<Aov::primitive_id>(view, scene, rays, hits, blocks);
   // These share the surface that they are taken from.
   store_planes<Aov::normal, Aov::geometric_normal, Aov::position, Aov::albedo, Aov::uv>(
-      view, scene, rays, hits, tile);
+      view, scene, rays, hits, blocks);
   if (view.motion != nullptr) {
-    store_planes<Aov::motion>(view, scene, rays, hits, tile, kernels::MotionPlane{*view.motion});
+    store_planes<Aov::motion>(view, scene, rays, hits, blocks, kernels::MotionPlane{*view.motion});
   }
   return {};
 }
@@ -231,13 +282,9 @@ util::Result<TraceStats> CpuRenderer::render(const kernels::RayCamera& camera,
   const bool wants_motion = geometry.test(static_cast<std::size_t>(Aov::motion));
   const kernels::MotionView motion =
       settings.next ? make_motion_view(camera, *settings.next) : kernels::MotionView{};
-  const View view{scene_,
-                  camera,
-                  settings.params,
-                  framebuffer.view(),
-                  geometry.any(),
-                  beauty,
-                  wants_motion ? &motion : nullptr};
+  const Outline outline(scene_.octree, camera);
+  const View view{scene_,  camera,         settings.params, framebuffer.view(),
+                  outline, geometry.any(), beauty,          wants_motion ? &motion : nullptr};
 
   TraceStats stats;
   TileFailure failure;

@@ -1,0 +1,97 @@
+#include "backend/render/outline.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace octrace::render {
+
+namespace {
+
+using Point = std::array<double, 3>;
+
+// Of distances and coordinates. A float ray strays from the plane by its rounding, 2^-21 of them at
+// the most, and a hit from its triangle by about as much; the boxes' own padding is of that size.
+constexpr double kMargin = 1e-4;
+
+Point point(const kernels::Vec3& v) { return {v.x, v.y, v.z}; }
+Point minus(const Point& a, const Point& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
+double dot(const Point& a, const Point& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+Point cross(const Point& a, const Point& b) {
+  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+}
+bool is_zero(const kernels::Vec3& v) { return v.x == 0.0f && v.y == 0.0f && v.z == 0.0f; }
+
+}  // namespace
+
+Outline::Outline(const kernels::OctreeView& octree, const kernels::RayCamera& camera)
+    : at_zero_{point(camera.origin), point(camera.direction)},
+      along_x_{point(camera.origin_x), point(camera.direction_x)},
+      along_y_{point(camera.origin_y), point(camera.direction_y)},
+      perspective_(is_zero(camera.origin_x) && is_zero(camera.origin_y)),
+      orthographic_(is_zero(camera.direction_x) && is_zero(camera.direction_y)) {
+  if (octree.nodes.size == 0) return;
+  const kernels::Node& root = octree.nodes[0];
+  for (int slot = 0; slot < kernels::kChildren; ++slot) {
+    if (root.meta[slot] == 0) continue;
+    Box& box = boxes_[static_cast<std::size_t>(box_count_++)];
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      box.lower[axis] = root.origin[axis] + std::ldexp(root.lower[axis][slot], root.exponent[axis]);
+      box.upper[axis] = root.origin[axis] + std::ldexp(root.upper[axis][slot], root.exponent[axis]);
+    }
+  }
+}
+
+Outline::CornerRay Outline::corner(double x, double y) const {
+  CornerRay ray;
+  for (std::size_t i = 0; i < 3; ++i) {
+    ray.origin[i] = at_zero_.origin[i] + x * along_x_.origin[i] + y * along_y_.origin[i];
+    ray.direction[i] =
+        at_zero_.direction[i] + x * along_x_.direction[i] + y * along_y_.direction[i];
+  }
+  return ray;
+}
+
+bool Outline::may_see(const Tile& pixels) const {
+  if (box_count_ == 0) return false;
+  if (!perspective_ && !orthographic_) return true;
+  const double x0 = pixels.x0, x1 = pixels.x1, y0 = pixels.y0, y1 = pixels.y1;
+  const std::array<CornerRay, 4> corners = {corner(x0, y0), corner(x1, y0), corner(x1, y1),
+                                            corner(x0, y1)};
+  std::array<bool, kernels::kChildren> gone{};
+  int left = box_count_;
+  for (std::size_t i = 0; i < 4 && left > 0; ++i) {
+    const CornerRay &from = corners[i], &to = corners[(i + 1) % 4];
+    Point normal = perspective_ ? cross(from.direction, to.direction)
+                                : cross(minus(to.origin, from.origin), from.direction);
+    // The other corners, and so all rays between, are on its inner side.
+    const auto side = [&](const CornerRay& ray) {
+      return perspective_ ? dot(normal, ray.direction)
+                          : dot(normal, minus(ray.origin, from.origin));
+    };
+    const double a = side(corners[(i + 2) % 4]), b = side(corners[(i + 3) % 4]);
+    if (a < 0.0 && b < 0.0) {
+      for (double& n : normal) n = -n;
+    } else if (!(a > 0.0 && b > 0.0)) {
+      continue;
+    }
+    for (std::size_t box = 0; box < static_cast<std::size_t>(box_count_); ++box) {
+      if (gone[box] || !beyond(boxes_[box], from.origin, normal)) continue;
+      gone[box] = true;
+      --left;
+    }
+  }
+  return left > 0;
+}
+
+// Whether the box is on the outer side of the plane, with a margin. A number that is none: no.
+bool Outline::beyond(const Box& box, const Point& origin, const Point& normal) const {
+  Point nearest;
+  double size = 0.0;  // of all that is rounded
+  for (std::size_t i = 0; i < 3; ++i) {
+    nearest[i] = (normal[i] > 0.0 ? box.upper[i] : box.lower[i]) - origin[i];
+    size = std::max({size, std::fabs(box.lower[i]), std::fabs(box.upper[i]), std::fabs(origin[i])});
+  }
+  return dot(normal, nearest) < -kMargin * 4.0 * size * std::sqrt(dot(normal, normal));
+}
+
+}  // namespace octrace::render
