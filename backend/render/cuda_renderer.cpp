@@ -5,6 +5,9 @@
 #include <algorithm>
 #include <chrono>
 #include <cstring>
+#include <memory>
+#include <span>
+#include <utility>
 
 #include "backend/util/log.h"
 
@@ -42,6 +45,33 @@ std::uint64_t bytes_a_row(const Framebuffer& framebuffer) {
   for_each_plane(framebuffer, 1,
                  [&](const AovInfo&, std::uint64_t, std::uint64_t row) { bytes += row; });
   return bytes;
+}
+
+// Planes that are filled again and again are locked in their place, and the device copies to them;
+// of those that are filled but once a copy in memory takes less time than locking them.
+class PinnedPlanes final : public PlaneHold {
+ public:
+  explicit PinnedPlanes(std::span<std::uint32_t> words) : words_(words) {}
+  ~PinnedPlanes() override {
+    if (pinned_) kernels::cuda::unpin(words_.data());
+  }
+  bool pin() {
+    if (tried_) return pinned_;
+    tried_ = true;  // what the system refuses once is not asked for again
+    return pinned_ = kernels::cuda::pin(words_.data(), words_.size_bytes()).ok();
+  }
+
+ private:
+  std::span<std::uint32_t> words_;
+  bool tried_ = false, pinned_ = false;
+};
+
+bool pin_when_reused(Framebuffer& framebuffer) {
+  if (auto* const planes = dynamic_cast<PinnedPlanes*>(framebuffer.hold().get())) {
+    return planes->pin();
+  }
+  framebuffer.hold() = std::make_unique<PinnedPlanes>(framebuffer.words());
+  return false;
 }
 
 Error trace_error(const Report& report) {
@@ -152,7 +182,7 @@ util::Result<std::uint32_t> CudaRenderer::choose_rows(const Framebuffer& framebu
 }
 
 Status CudaRenderer::start(Band& band, const kernels::cuda::InstancedView& whole,
-                           const Framebuffer& framebuffer) {
+                           Framebuffer& framebuffer, bool pinned) {
   kernels::cuda::InstancedView view = whole;
   view.target = {};
   view.target.width = framebuffer.width();
@@ -173,8 +203,19 @@ Status CudaRenderer::start(Band& band, const kernels::cuda::InstancedView& whole
             : kernels::cuda::launch_instanced_view(view, report, stream);
   }
   if (s.ok()) s = kernels::cuda::record_event(band.traced.get(), stream);
-  const std::uint64_t bytes = bytes_a_row(framebuffer) * band.rows;
-  if (s.ok()) s = kernels::cuda::copy_to_host(band.host_planes.data(), planes, bytes, stream);
+  if (pinned) {
+    const kernels::FramebufferView to = framebuffer.view();
+    for_each_plane(framebuffer, band.rows,
+                   [&](const AovInfo& info, std::uint64_t offset, std::uint64_t row) {
+                     auto* plane = static_cast<std::byte*>(to.planes[static_cast<int>(info.aov)]);
+                     if (!s.ok()) return;
+                     s = kernels::cuda::copy_to_host(plane + row * band.first_row, planes + offset,
+                                                     row * band.rows, stream);
+                   });
+  } else if (s.ok()) {
+    s = kernels::cuda::copy_to_host(band.host_planes.data(), planes,
+                                    bytes_a_row(framebuffer) * band.rows, stream);
+  }
   if (s.ok()) {
     s = kernels::cuda::copy_to_host(band.host_report.data(), report, sizeof(Report), stream);
   }
@@ -182,8 +223,10 @@ Status CudaRenderer::start(Band& band, const kernels::cuda::InstancedView& whole
   return s;
 }
 
-util::Result<void> CudaRenderer::finish(Band& band, Framebuffer& framebuffer, TraceStats& stats) {
-  if (band.rows == 0) return {};
+util::Result<void> CudaRenderer::finish(Band& band, Framebuffer& framebuffer, bool pinned,
+                                        TraceStats& stats) {
+  const std::uint32_t rows = std::exchange(band.rows, 0);
+  if (rows == 0) return {};
   if (Status s = kernels::cuda::synchronize(band.stream.get()); !s.ok()) return cuda_error(s);
   const Report& report = *static_cast<const Report*>(band.host_report.data());
   if (report.status != 0) return trace_error(report);
@@ -195,14 +238,14 @@ util::Result<void> CudaRenderer::finish(Band& band, Framebuffer& framebuffer, Tr
   stats.download_seconds += copy_ms * 1e-3;
   stats.beauty_rays += report.beauty_rays;
   stats.shadow_rays += report.shadow_rays;
+  if (pinned) return {};
   const kernels::FramebufferView to = framebuffer.view();
   const auto* from = static_cast<const std::byte*>(band.host_planes.data());
-  for_each_plane(framebuffer, band.rows,
+  for_each_plane(framebuffer, rows,
                  [&](const AovInfo& info, std::uint64_t offset, std::uint64_t row) {
                    auto* plane = static_cast<std::byte*>(to.planes[static_cast<int>(info.aov)]);
-                   std::memcpy(plane + row * band.first_row, from + offset, row * band.rows);
+                   std::memcpy(plane + row * band.first_row, from + offset, row * rows);
                  });
-  band.rows = 0;
   return {};
 }
 
@@ -232,6 +275,7 @@ util::Result<TraceStats> CudaRenderer::render(const kernels::RayCamera& camera,
     if (!motion) return motion.error();
     view.motion = *motion;
   }
+  const bool pinned = pin_when_reused(framebuffer);
   TraceStats stats;
   util::Result<void> result;
   std::size_t turn = 0;
@@ -241,17 +285,17 @@ util::Result<TraceStats> CudaRenderer::render(const kernels::RayCamera& camera,
       break;
     }
     Band& band = bands_[turn % bands_.size()];
-    result = finish(band, framebuffer, stats);
+    result = finish(band, framebuffer, pinned, stats);
     if (!result) break;
     band.first_row = row;
     band.rows = std::min(*rows, framebuffer.height() - row);
-    if (Status s = start(band, view, framebuffer); !s.ok()) result = cuda_error(s);
+    if (Status s = start(band, view, framebuffer, pinned); !s.ok()) result = cuda_error(s);
     if (settings.progress) settings.progress(static_cast<double>(row) / framebuffer.height());
   }
-  // Whatever happened, nothing may still be writing to the bands when this returns.
+  // Whatever happened, nothing may still be writing to the bands or the planes when this returns.
   for (std::size_t i = 0; i < bands_.size(); ++i) {
     Band& band = bands_[(turn + i) % bands_.size()];
-    if (result) result = finish(band, framebuffer, stats);
+    if (result) result = finish(band, framebuffer, pinned, stats);
     if (!result) kernels::cuda::synchronize(band.stream.get());
     band.rows = 0;
   }

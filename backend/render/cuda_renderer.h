@@ -37,8 +37,8 @@ class CudaRenderer final : public Renderer {
   util::Result<kernels::MotionView> upload_motion(const kernels::RayCamera& camera,
                                                   const NextFrame& next);
   kernels::cuda::Status start(Band& band, const kernels::cuda::InstancedView& view,
-                              const Framebuffer& framebuffer);
-  util::Result<void> finish(Band& band, Framebuffer& framebuffer, TraceStats& stats);
+                              Framebuffer& framebuffer, bool pinned);
+  util::Result<void> finish(Band& band, Framebuffer& framebuffer, bool pinned, TraceStats& stats);
 
   const scene::Scene& source_;
   const octree::Octree& octree_;

@@ -26,6 +26,17 @@ Framebuffer::Framebuffer(std::uint32_t width, std::uint32_t height, AovSet aovs)
   }
 }
 
+Framebuffer& Framebuffer::operator=(Framebuffer&& other) noexcept {
+  hold_.reset();  // before the planes that it is of
+  width_ = other.width_;
+  height_ = other.height_;
+  aovs_ = other.aovs_;
+  words_ = std::move(other.words_);
+  planes_ = other.planes_;
+  hold_ = std::move(other.hold_);
+  return *this;
+}
+
 // Planes are allocated as 32-bit words, and kernels fill them as float or uint32 through void*; the
 // two have one size and alignment, and each plane is read as what it was written as.
 std::span<const float> Framebuffer::floats(Aov aov) const {

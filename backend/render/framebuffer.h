@@ -4,6 +4,7 @@
 #include <array>
 #include <bitset>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <string>
 #include <string_view>
@@ -34,15 +35,25 @@ const AovInfo& aov_info(Aov aov);
 util::Result<AovSet> parse_aovs(std::string_view list);
 std::string aov_names();  // "beauty, depth (Z), ..."
 
+// What a device did to the memory of planes; undone before that is freed.
+class PlaneHold {
+ public:
+  virtual ~PlaneHold() = default;
+};
+
 class Framebuffer {
  public:
   Framebuffer(std::uint32_t width, std::uint32_t height, AovSet aovs);
+  Framebuffer(Framebuffer&&) = default;
+  Framebuffer& operator=(Framebuffer&& other) noexcept;
   std::uint32_t width() const { return width_; }
   std::uint32_t height() const { return height_; }
   AovSet aovs() const { return aovs_; }
   std::span<const float> floats(Aov aov) const;
   std::span<const std::uint32_t> uints(Aov aov) const;
   kernels::FramebufferView view();
+  std::span<std::uint32_t> words() { return {words_.data(), words_.size()}; }  // all planes
+  std::unique_ptr<PlaneHold>& hold() { return hold_; }
 
  private:
   std::uint32_t width_, height_;
@@ -51,6 +62,7 @@ class Framebuffer {
   // would cost as much as tracing a view.
   util::HugeArray<std::uint32_t> words_;
   std::array<std::span<std::uint32_t>, kernels::kAovCount> planes_;
+  std::unique_ptr<PlaneHold> hold_;
 };
 
 }  // namespace octrace::render

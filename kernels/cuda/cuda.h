@@ -44,6 +44,10 @@ Status allocate(void** memory, std::uint64_t bytes);
 void release(void* memory);
 Status allocate_pinned(void** memory, std::uint64_t bytes);
 void release_pinned(void* memory);
+// Locks memory of other origin in its place, so that it is copied to and from without a step
+// between.
+Status pin(void* memory, std::uint64_t bytes);
+void unpin(void* memory);
 
 using Stream = void*;
 Status create_stream(Stream* stream);

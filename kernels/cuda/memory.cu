@@ -47,6 +47,14 @@ Status allocate_pinned(void** memory, std::uint64_t bytes) {
 
 void release_pinned(void* memory) { cudaFreeHost(memory); }
 
+Status pin(void* memory, std::uint64_t bytes) {
+  const cudaError_t error = cudaHostRegister(memory, bytes, cudaHostRegisterPortable);
+  if (error != cudaSuccess) cudaGetLastError();
+  return status_of(error, "locking memory");
+}
+
+void unpin(void* memory) { cudaHostUnregister(memory); }
+
 Status create_stream(Stream* stream) {
   cudaStream_t created = nullptr;
   const cudaError_t error = cudaStreamCreateWithFlags(&created, cudaStreamNonBlocking);

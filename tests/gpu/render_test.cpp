@@ -63,6 +63,33 @@ std::uint64_t differing_bits(Framebuffer& a, Framebuffer& b) {
 
 struct OnDevice : testing::TestWithParam<render::DeviceChoice> {};
 
+// From the second time on a GPU copies to the planes themselves, band by band.
+TEST_P(OnDevice, PlanesThatAreFilledAgainAreAsNewOnes) {
+  const auto loaded = load_for_device_test("builtin:default");
+  ASSERT_TRUE(loaded);
+  const auto renderer = render::make_renderer(loaded->scene, loaded->octree, GetParam());
+  constexpr std::uint32_t kWidth = 1021, kHeight = 1100;  // two bands
+  auto reused = std::make_unique<Framebuffer>(kWidth, kHeight, geometry_aovs());
+  scene::Camera camera = first_camera(loaded->scene, double(kWidth) / kHeight);
+  for (int view = 0; view < 4; ++view) {
+    camera.yfov *= 0.8;
+    const kernels::RayCamera rays = scene::make_ray_camera(camera, kWidth, kHeight);
+    Framebuffer fresh(kWidth, kHeight, geometry_aovs());
+    ASSERT_TRUE(renderer->render(rays, {}, fresh));
+    ASSERT_TRUE(renderer->render(rays, {}, *reused));
+    EXPECT_EQ(differing_bits(fresh, *reused), 0u) << "view " << view;
+  }
+  // Memory that others get afterwards is theirs alone.
+  reused.reset();
+  for (int i = 0; i < 3; ++i) {
+    Framebuffer next(kWidth, kHeight, geometry_aovs());
+    Framebuffer moved(std::move(next));
+    for (int time = 0; time < 3; ++time) {
+      ASSERT_TRUE(renderer->render(scene::make_ray_camera(camera, kWidth, kHeight), {}, moved));
+    }
+  }
+}
+
 TEST_P(OnDevice, DepthOfASphereIsItsClosedForm) {
   LoadedScene loaded;
   const Mesh mesh = make_sphere(256, kernels::Vec3(0.0f), 1.0f);
