@@ -324,7 +324,11 @@ Result<RunSummary> run_plan(const Plan& plan, const RunOptions& options) {
   }
   auto done = read_done(plan, meaning, options.shard);
   if (!done) return done.error();
-  if (!done->clean) remove_leftovers(plan, options.shard);
+  if (!done->clean) {
+    remove_leftovers(plan, options.shard);
+  } else if (options.shard.count == 1) {
+    remove_result_leftovers(plan);  // of a merge that was killed
+  }
 
   RunSummary summary;
   summary.broken_lines = done->broken_lines;
@@ -348,7 +352,13 @@ Result<RunSummary> run_plan(const Plan& plan, const RunOptions& options) {
   if (summary.interrupted) util::acknowledge_interrupt();
   // Before the journal's last line: a run that is killed here has not ended in good order, and the
   // next one looks for what it left.
-  auto ended = write_results(plan, options, summary);
+  auto ended = [&]() -> Result<void> {
+    try {
+      return write_results(plan, options, summary);
+    } catch (const std::bad_alloc&) {
+      return util::Error{util::Exit::limit, "", "out of memory", plan.folder(), ""};
+    }
+  }();
   const ordered_json last = {{"kind", "end"},
                              {"seconds", summary.standing.seconds},
                              {"done", summary.standing.done},

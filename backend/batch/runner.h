@@ -54,15 +54,17 @@ struct RunSummary {
   Standing standing;
   std::uint64_t scenes_loaded = 0, broken_lines = 0;
   std::vector<Failure> failures;
-  std::optional<util::Error>
-      fatal;  // what ended the run early: a full disk, a folder that became read-only
+  // What ended the run early (a full disk, a folder that became read-only), or kept its results
+  // from being written.
+  std::optional<util::Error> fatal;
   bool interrupted = false;
   std::string device;
   // Milliseconds: of the tracing thread (load: what it waited for), and of all writers together.
   double load_ms = 0.0, trace_ms = 0.0, wait_ms = 0.0, encode_ms = 0.0, flush_ms = 0.0;
 };
 
-// An error: nothing was rendered. Else what came of it, also where it ended early.
+// An error: nothing was rendered. Else what came of it, also where it ended early; the summary and
+// the files made from the journals are written (finish.h).
 util::Result<RunSummary> run_plan(const Plan& plan, const RunOptions& options);
 
 }  // namespace octrace::batch

@@ -14,7 +14,7 @@ namespace octrace::image {
 // Takes a piece of the stream; an error ends it.
 using DeflateSink = std::function<util::Result<void>(std::string_view piece)>;
 
-// The parts one after another as one raw stream. Exit 6: no memory for it.
+// The parts one after another as one raw stream. Exit 6, or bad_alloc: no memory for it.
 util::Result<void> deflate(std::span<const std::string_view> parts, const DeflateSink& sink);
 
 }  // namespace octrace::image

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <limits>
 #include <memory>
+#include <new>
 #include <string>
 
 #include "backend/image/deflate.h"
@@ -14,20 +15,24 @@ namespace octrace::image {
 
 namespace {
 
-// Kept by each thread that compresses.
+// Kept by each thread that compresses, which needs no image library for it: nobody waits for the
+// dynamic loader here but a first view whose library is still loading.
 struct Workspace {
   isal_zstream stream;
   std::uint8_t level_buffer[ISAL_DEF_LVL1_DEFAULT];
 };
 
-isal_zstream& stream_of_thread() {
-  thread_local const auto workspace = std::make_unique_for_overwrite<Workspace>();
+// Null: no memory for it.
+isal_zstream* stream_of_thread() {
+  thread_local std::unique_ptr<Workspace> workspace;
+  if (workspace == nullptr) workspace.reset(new (std::nothrow) Workspace);
+  if (workspace == nullptr) return nullptr;
   isal_zstream& stream = workspace->stream;
   ::isal_deflate_init(&stream);
   stream.level = 1;
   stream.level_buf = workspace->level_buffer;
   stream.level_buf_size = sizeof workspace->level_buffer;
-  return stream;
+  return &stream;
 }
 
 std::uint8_t* bytes_of(const void* data) {
@@ -49,11 +54,12 @@ bool feed(isal_zstream& stream, const void* from, std::size_t size, int flush, b
   return ::isal_deflate(&stream) == COMP_OK;
 }
 
-// In zlib's format. 0: does not fit.
+// In zlib's format. 0: does not fit, or no memory.
 std::size_t compress_whole(const Bytef* from, std::size_t size, void* to, std::size_t room) {
   constexpr std::size_t kMost = std::numeric_limits<std::uint32_t>::max();
-  if (size > kMost) return 0;
-  isal_zstream& stream = stream_of_thread();
+  isal_zstream* const own = stream_of_thread();
+  if (own == nullptr || size > kMost) return 0;
+  isal_zstream& stream = *own;
   stream.gzip_flag = IGZIP_ZLIB;
   stream.next_out = bytes_of(to);
   stream.avail_out = static_cast<std::uint32_t>(std::min(room, kMost));
@@ -87,15 +93,18 @@ int compress_by_zlib(Bytef* to, uLongf* to_size, const Bytef* from, uLong size, 
 }  // namespace
 
 util::Result<void> deflate(std::span<const std::string_view> parts, const DeflateSink& sink) {
-  isal_zstream& stream = stream_of_thread();
+  isal_zstream* const own = stream_of_thread();
+  if (own == nullptr) {
+    return util::Error{util::Exit::limit, "", "out of memory for compression", "", ""};
+  }
+  isal_zstream& stream = *own;
+  const util::Error failed{util::Exit::internal, "", "ISA-L: compression failed", "", ""};
   std::string packed(1 << 18, '\0');
   const auto run = [&](std::string_view bytes, int flush, bool last) -> util::Result<void> {
     do {
       stream.next_out = bytes_of(packed.data());
       stream.avail_out = static_cast<std::uint32_t>(packed.size());
-      if (!feed(stream, bytes.data(), bytes.size(), flush, last)) {
-        return util::Error{util::Exit::internal, "", "ISA-L: compression failed", "", ""};
-      }
+      if (!feed(stream, bytes.data(), bytes.size(), flush, last)) return failed;
       bytes.remove_prefix(bytes.size() - stream.avail_in);
       auto taken = sink(std::string_view(packed.data(), packed.size() - stream.avail_out));
       if (!taken) return taken;
@@ -117,8 +126,10 @@ util::Result<void> deflate(std::span<const std::string_view> parts, const Deflat
       part.remove_prefix(piece.size());
     }
   }
-  return run(opening.size() < kOpening ? std::string_view(opening) : std::string_view(), NO_FLUSH,
-             true);
+  const bool few = opening.size() < kOpening;
+  auto ended = run(few ? std::string_view(opening) : std::string_view(), NO_FLUSH, true);
+  if (ended && stream.internal_state.state != ZSTATE_END) return failed;
+  return ended;
 }
 
 }  // namespace octrace::image

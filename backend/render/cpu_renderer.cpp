@@ -150,8 +150,9 @@ std::vector<kernels::Ray> camera_rays(const kernels::RayCamera& camera, const Ti
     rows.push_back(camera_row(camera, static_cast<float>(y) + 0.5f));
   }
   std::size_t count = 0;
-  for (const Tile& block : blocks)
+  for (const Tile& block : blocks) {
     count += std::size_t{block.x1 - block.x0} * (block.y1 - block.y0);
+  }
   std::vector<kernels::Ray> rays(count);
   std::size_t next = 0;
   visit_pixels(blocks, [&](std::uint32_t x, std::uint32_t y) {

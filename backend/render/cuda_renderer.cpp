@@ -51,9 +51,11 @@ std::uint64_t bytes_a_row(const Framebuffer& framebuffer) {
 // of those that are filled but once a copy in memory takes less time than locking them.
 class PinnedPlanes final : public PlaneHold {
  public:
-  explicit PinnedPlanes(std::span<std::uint32_t> words) : words_(words) {}
+  PinnedPlanes(int device, std::span<std::uint32_t> words) : device_(device), words_(words) {}
   ~PinnedPlanes() override {
-    if (pinned_) kernels::cuda::unpin(words_.data());
+    if (!pinned_) return;
+    kernels::cuda::select_device(device_);  // another thread's would be the first GPU
+    kernels::cuda::unpin(words_.data());
   }
   bool pin() {
     if (tried_) return pinned_;
@@ -62,15 +64,16 @@ class PinnedPlanes final : public PlaneHold {
   }
 
  private:
+  const int device_;
   std::span<std::uint32_t> words_;
   bool tried_ = false, pinned_ = false;
 };
 
-bool pin_when_reused(Framebuffer& framebuffer) {
+bool pin_when_reused(int device, Framebuffer& framebuffer) {
   if (auto* const planes = dynamic_cast<PinnedPlanes*>(framebuffer.hold().get())) {
     return planes->pin();
   }
-  framebuffer.hold() = std::make_unique<PinnedPlanes>(framebuffer.words());
+  framebuffer.hold() = std::make_unique<PinnedPlanes>(device, framebuffer.words());
   return false;
 }
 
@@ -275,7 +278,7 @@ util::Result<TraceStats> CudaRenderer::render(const kernels::RayCamera& camera,
     if (!motion) return motion.error();
     view.motion = *motion;
   }
-  const bool pinned = pin_when_reused(framebuffer);
+  const bool pinned = pin_when_reused(device_, framebuffer);
   TraceStats stats;
   util::Result<void> result;
   std::size_t turn = 0;

@@ -52,7 +52,7 @@ class Framebuffer {
   std::span<const float> floats(Aov aov) const;
   std::span<const std::uint32_t> uints(Aov aov) const;
   kernels::FramebufferView view();
-  std::span<std::uint32_t> words() { return {words_.data(), words_.size()}; }  // all planes
+  std::span<std::uint32_t> words() { return {words_.data(), words_.size()}; }  // what is held
   std::unique_ptr<PlaneHold>& hold() { return hold_; }
 
  private:

@@ -9,9 +9,11 @@ namespace {
 
 using Point = std::array<double, 3>;
 
-// Of distances and coordinates. A float ray strays from the plane by its rounding, 2^-21 of them at
-// the most, and a hit from its triangle by about as much; the boxes' own padding is of that size.
-constexpr double kMargin = 1e-4;
+// Of the largest coordinate; nothing here is more than 2 sqrt(3) of it away. Rounding moves a float
+// ray, and the corners by whose exact signs the triangle test takes or leaves it, by 2^-20 of it at
+// the most. (Where on the ray the hit is may be less exact, but that does not matter to a plane
+// that the whole ray lies beyond.)
+constexpr double kMargin = 4e-4;
 
 Point point(const kernels::Vec3& v) { return {v.x, v.y, v.z}; }
 Point minus(const Point& a, const Point& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
@@ -91,7 +93,7 @@ bool Outline::beyond(const Box& box, const Point& origin, const Point& normal) c
     nearest[i] = (normal[i] > 0.0 ? box.upper[i] : box.lower[i]) - origin[i];
     size = std::max({size, std::fabs(box.lower[i]), std::fabs(box.upper[i]), std::fabs(origin[i])});
   }
-  return dot(normal, nearest) < -kMargin * 4.0 * size * std::sqrt(dot(normal, normal));
+  return dot(normal, nearest) < -kMargin * size * std::sqrt(dot(normal, normal));
 }
 
 }  // namespace octrace::render

@@ -28,7 +28,7 @@ struct Settings {
 };
 
 struct TraceStats {
-  std::uint64_t camera_rays = 0;  // geometry AOVs
+  std::uint64_t camera_rays = 0;  // geometry AOVs: their pixels, of filled background as well
   std::uint64_t beauty_rays = 0;  // camera, transparency and sky rays of beauty
   std::uint64_t shadow_rays = 0;
   double seconds = 0.0;

@@ -53,7 +53,9 @@ Status pin(void* memory, std::uint64_t bytes) {
   return status_of(error, "locking memory");
 }
 
-void unpin(void* memory) { cudaHostUnregister(memory); }
+void unpin(void* memory) {
+  if (cudaHostUnregister(memory) != cudaSuccess) cudaGetLastError();
+}
 
 Status create_stream(Stream* stream) {
   cudaStream_t created = nullptr;

@@ -71,6 +71,20 @@ class Resume(BatchCase):
         self.run_batch()
         self.assertEqual(self.temporaries(), [])
 
+    def test_results_that_cannot_be_written(self):
+        self.job()
+        os.makedirs(self.path("out", "cameras.json"))
+        _, err = self.run_batch(code=5)
+        self.assertIn("cameras.json", err)
+        self.assertEqual(self.journal()[-1]["kind"], "end")
+        self.assertEqual(self.temporaries(), [])
+        self.assertFalse(os.path.exists(self.path("out", "summary.json")))
+        os.rmdir(self.path("out", "cameras.json"))
+        _, err = self.run_batch()
+        self.assertIn("6 before", err)
+        for name in ("cameras.json", "objects.json", "summary.json"):
+            self.assertTrue(os.path.isfile(self.path("out", name)), name)
+
     def test_a_merge_removes_what_a_killed_one_left(self):
         self.job()
         self.run_batch("--shard", "1/2")

@@ -10,6 +10,8 @@
 #include <cstring>
 #include <functional>
 #include <limits>
+#include <string>
+#include <vector>
 
 #include "backend/octree/builders.h"
 #include "backend/octree/top_tree.h"
@@ -51,42 +53,44 @@ Mesh make_dust(std::uint32_t count, float scale = 1.0f) {
   });
 }
 
+// Made when it is asked for: every process of these tests goes through all names.
+struct LargeMesh {
+  std::string name;
+  std::function<Mesh()> make;
+};
+
 // From 5462 triangles on a scene has more than one range, of up to 8192 references; at 43696 the
 // ranges become smaller (subtree_size() in top_tree.cpp).
-std::vector<Mesh> large_meshes() {
-  std::vector<Mesh> meshes;
+std::vector<LargeMesh> large_meshes() {
+  std::vector<LargeMesh> meshes;
   for (const std::uint32_t count :
        {5460u, 5461u, 5462u, 8191u, 8192u, 8193u, 43690u, 43695u, 43696u, 100000u}) {
-    meshes.push_back(make_dust(count));
-    meshes.back().name += " " + std::to_string(count);
+    meshes.push_back({"dust_" + std::to_string(count), [count] { return make_dust(count); }});
   }
-  meshes.push_back(make("one place", 8193, [](std::uint32_t, int c, std::mt19937_64&) {
-    return Vec3(c == 0, c == 1, c == 2);
-  }));
-  meshes.push_back(make("one point", 20000, [](std::uint32_t, int, std::mt19937_64&) {
-    return Vec3(3.0f, -2.0f, 1.0f);
-  }));
-  meshes.push_back(make("long slivers", 20000, [](std::uint32_t i, int c, std::mt19937_64& random) {
+  const auto add = [&](const char* name, std::uint32_t count, const Corner& corner) {
+    meshes.push_back({name, [=] { return make(name, count, corner); }});
+  };
+  add("one_place", 8193,
+      [](std::uint32_t, int c, std::mt19937_64&) { return Vec3(c == 0, c == 1, c == 2); });
+  add("one_point", 20000,
+      [](std::uint32_t, int, std::mt19937_64&) { return Vec3(3.0f, -2.0f, 1.0f); });
+  add("long_slivers", 20000, [](std::uint32_t i, int c, std::mt19937_64& random) {
     const float y = static_cast<float>(i) * 1e-4f;
     return c == 0   ? Vec3(-100.0f, y, 0.0f)
            : c == 1 ? Vec3(100.0f, y, uniform(random))
                     : Vec3(100.0f, y + 1e-6f, 0.0f);
-  }));
-  meshes.push_back(
-      make("one huge among many", 20000, [](std::uint32_t i, int c, std::mt19937_64& r) {
-        if (i == 7777)
-          return Vec3(c == 0 ? 1e4f : -1.0f, c == 1 ? 1e4f : -1.0f, c == 2 ? 1e4f : -1.0f);
-        return Vec3(uniform(r), uniform(r), uniform(r)) * 0.01f + Vec3(static_cast<float>(i % 141));
-      }));
-  meshes.push_back(make_dust(20000, 1e-42f));  // denormals
-  meshes.back().name = "denormals";
-  meshes.push_back(make_dust(20000, 9e8f));
-  meshes.back().name = "far";
+  });
+  add("one_huge_among_many", 20000, [](std::uint32_t i, int c, std::mt19937_64& r) {
+    if (i == 7777) return Vec3(c == 0 ? 1e4f : -1.0f, c == 1 ? 1e4f : -1.0f, c == 2 ? 1e4f : -1.0f);
+    return Vec3(uniform(r), uniform(r), uniform(r)) * 0.01f + Vec3(static_cast<float>(i % 141));
+  });
+  meshes.push_back({"denormals", [] { return make_dust(20000, 1e-42f); }});
+  meshes.push_back({"far", [] { return make_dust(20000, 9e8f); }});
   // Ever smaller triangles about one corner: the deepest trees, from which halving by rank saves.
-  meshes.push_back(make("chain", 20000, [](std::uint32_t i, int c, std::mt19937_64&) {
+  add("chain", 20000, [](std::uint32_t i, int c, std::mt19937_64&) {
     const float s = std::exp2(-0.007f * static_cast<float>(i));
     return Vec3(c == 0 ? s : 0.0f, c == 1 ? s : 0.0f, c == 2 ? s : 0.0f);
-  }));
+  });
   return meshes;
 }
 
@@ -108,7 +112,7 @@ octree::Octree build(const Mesh& mesh, std::uint32_t least_for_subtrees, unsigne
 struct OctreeSubtrees : testing::TestWithParam<std::size_t> {
   // As many threads as are asked for, on machines of fewer cores as well.
   tbb::global_control more{tbb::global_control::max_allowed_parallelism, 8};
-  Mesh mesh = large_meshes()[GetParam()];
+  Mesh mesh = large_meshes()[GetParam()].make();
 };
 
 TEST_P(OctreeSubtrees, RangesHoldAllReferences) {
@@ -250,11 +254,7 @@ TEST(OctreeOfHugeTriangles, IsSound) {
 
 INSTANTIATE_TEST_SUITE_P(Meshes, OctreeSubtrees,
                          testing::Range<std::size_t>(0, large_meshes().size()),
-                         [](const auto& about) {
-                           std::string name = large_meshes()[about.param].name;
-                           std::replace(name.begin(), name.end(), ' ', '_');
-                           return name;
-                         });
+                         [](const auto& about) { return large_meshes()[about.param].name; });
 
 }  // namespace
 }  // namespace octrace::tests

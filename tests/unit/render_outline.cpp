@@ -3,13 +3,18 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <glm/geometric.hpp>
 #include <glm/gtc/matrix_transform.hpp>
 #include <random>
 
 #include "backend/octree/instance_levels.h"
+#include "backend/render/motion.h"
 #include "kernels/cpu/intersect.h"
+#include "kernels/pixel.h"
+#include "tests/support/intensity.h"
 #include "tests/unit/render_scene.h"
 
 namespace octrace::test {
@@ -60,7 +65,15 @@ scene::Camera random_camera(Sampler& sampler, const dvec3& centre, double size) 
   const dvec3 target = centre + sampler.direction() * distance * sampler.between(0.0, 1.5);
   scene::Camera camera;
   camera.matrix = glm::inverse(glm::lookAt(eye, target, sampler.direction()));
-  if (sampler.between(0, 1) < 0.4) {
+  if (sampler.between(0, 1) < 0.2) camera.matrix[0] = -camera.matrix[0];  // a mirrored image
+  const double kind = sampler.between(0, 1);
+  if (kind < 0.2) {
+    camera.type = scene::CameraType::pinhole;
+    camera.fx = kWidth * std::pow(10.0, sampler.between(-1, 1));
+    camera.fy = camera.fx * sampler.between(0.5, 2.0);
+    camera.cx = kWidth * sampler.between(-1.0, 2.0);  // beside the image as well
+    camera.cy = kHeight * sampler.between(-1.0, 2.0);
+  } else if (kind < 0.5) {
     camera.type = scene::CameraType::orthographic;
     camera.ymag = size * std::pow(10.0, sampler.between(-2, 1));
     camera.xmag = sampler.between(0, 1) < 0.2 ? -camera.ymag : camera.ymag;
@@ -72,9 +85,10 @@ scene::Camera random_camera(Sampler& sampler, const dvec3& centre, double size) 
 }
 
 TEST(Outline, BlocksThatSeeNothingSeeNothing) {
-  Sampler sampler(3);
-  int seen = 0, unseen = 0;
-  for (int round = 0; round < 1500; ++round) {
+  Sampler sampler(static_cast<std::uint32_t>(tests::seed()));
+  std::uint64_t seen = 0, unseen = 0;
+  const std::uint64_t rounds = tests::scaled(1500);
+  for (std::uint64_t round = 0; round < rounds; ++round) {
     const double size = std::pow(10.0, sampler.between(-3, 3));
     // At the origin, or so far from it that coordinates are coarse.
     const dvec3 centre = sampler.direction() * size * std::pow(10.0, sampler.between(-2, 5));
@@ -100,13 +114,48 @@ TEST(Outline, BlocksThatSeeNothingSeeNothing) {
           kernels::Hit hit;
           ASSERT_EQ(tracer.closest(world, {}, kernels::camera_ray(camera, x, y), &hit),
                     kernels::TraceStatus::ok);
-          ASSERT_FALSE(hit.valid()) << "round " << round << ", pixel " << x << ", " << y;
+          ASSERT_FALSE(hit.valid())
+              << "seed " << tests::seed() << ", round " << round << ", pixel " << x << ", " << y;
         }
       }
     }
   }
-  EXPECT_GT(seen, 1000);
-  EXPECT_GT(unseen, 1000);
+  EXPECT_GT(seen, rounds * 3);
+  EXPECT_GT(unseen, rounds * 3);
+}
+
+// Every plane, motion as well, is what a ray through each pixel gives.
+TEST(Outline, BackgroundIsWhatTracingGives) {
+  constexpr std::uint32_t kSide = 160;
+  scene::Scene scene = empty_scene();
+  add_mesh(scene, make_ball({0.2f, 0.1f, 0}, 0.4f, 32, 16, true), 0);
+  const auto octree = octree::build(scene, {});
+  ASSERT_TRUE(octree);
+  const kernels::RayCamera camera =
+      scene::make_ray_camera(camera_at({0, 0, 10}, 0.4), kSide, kSide);
+  std::vector<Vec3> moved = scene.positions;
+  for (Vec3& position : moved) position.x += 0.1f;
+  render::Settings settings;
+  settings.next = {moved, camera};
+  render::AovSet planes;
+  planes.set().reset(static_cast<std::size_t>(render::Aov::beauty));
+  render::Framebuffer image(kSide, kSide, planes), expected(kSide, kSide, planes);
+  std::ranges::fill(image.words(), 0xffffffffu);
+  ASSERT_TRUE(render::make_cpu_renderer(scene, *octree)->render(camera, settings, image));
+
+  const kernels::InstancedSceneView view = octree::instanced_view(scene, *octree);
+  const kernels::SceneView& world = view;
+  const kernels::MotionView motion = render::make_motion_view(camera, *settings.next);
+  for (std::uint32_t y = 0; y < kSide; ++y) {
+    for (std::uint32_t x = 0; x < kSide; ++x) {
+      ASSERT_EQ(kernels::trace_geometry(world, camera, {}, expected.view(), x, y,
+                                        kernels::CpuTracer(), kernels::MotionPlane{motion}),
+                kernels::TraceStatus::ok);
+    }
+  }
+  ASSERT_EQ(image.words().size(), expected.words().size());
+  EXPECT_EQ(std::memcmp(image.words().data(), expected.words().data(), image.words().size_bytes()),
+            0);
 }
 
 // A ball in the middle of an image: what is well outside of it is known to be empty.
