@@ -305,7 +305,7 @@ class Disks(BatchCase):
         _, err = self.run_batch(code=5)
         self.assertIn("No space left", err)
         self.assertEqual(self.temporaries(), [])
-        packs = [line["path"] for line in self.journal() if line["kind"] == "pack"]
+        packs = sorted(line["path"] for line in self.journal() if line["kind"] == "pack")
         self.assertEqual(packs, [name for name in sorted(os.listdir(self.path("out")))
                                  if name.endswith(".tar")])
         self.assertTrue(0 < len(packs) < 3)

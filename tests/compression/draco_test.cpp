@@ -266,7 +266,9 @@ TEST(Draco, OrientationsAreBoundedByTheMesh) {
     if (document) continue;
     EXPECT_NE(document.error().exit, util::Exit::internal) << document.error().to_string();
     const bool counted = document.error().message.find("orientations") != std::string::npos;
-    if (counted) EXPECT_EQ(document.error().code, "DRACO_DATA_INVALID");
+    if (counted) {
+      EXPECT_EQ(document.error().code, "DRACO_DATA_INVALID");
+    }
     refused += counted;
   }
   EXPECT_GT(refused, 0) << "no number of orientations was found";
