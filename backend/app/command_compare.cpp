@@ -122,10 +122,9 @@ void declare_compare(CLI::App& program, Run& chosen) {
   command->add_option("--tolerance", request->tolerances, tolerance_help())
       ->allow_extra_args(false)
       ->type_name("NAME=VALUE");
-  command->add_option("--what", request->what, "which planes to compare [all that both have]")
-      ->transform(CLI::CheckedTransformer(std::map<std::string, What>{
-          {"all", What::all}, {"geometry", What::geometry}, {"beauty", What::beauty}}))
-      ->type_name("all|geometry|beauty");
+  add_choice<What>(*command, "--what", request->what,
+                   {{"all", What::all}, {"geometry", What::geometry}, {"beauty", What::beauty}},
+                   "which planes to compare [all that both have]");
   add_limit_options(*command, request->limits);
   add_verbosity_options(*command);
   command->callback([request, &chosen] { chosen = [request] { return run_compare(*request); }; });

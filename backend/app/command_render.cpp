@@ -254,6 +254,10 @@ util::Result<void> write_outputs(const RenderOptions& options, const Plan& plan,
   }
   for (std::size_t i = 0; i < plan.outputs.size(); ++i) {
     progress.update(static_cast<double>(i) / static_cast<double>(plan.outputs.size()));
+    if (const auto warning =
+            batch::depth_warning(plan.outputs[i], framebuffer, options.depth_scale)) {
+      util::log_warning(*warning);
+    }
     util::Result<void> written =
         write_output(plan.outputs[i], framebuffer, options.depth_scale, metadata);
     if (!written) return written;

@@ -4,6 +4,8 @@
 #include <cstdio>
 #include <cstdlib>
 #include <new>
+#include <string>
+#include <vector>
 
 #include "backend/app/command.h"
 #include "backend/image/image.h"
@@ -43,7 +45,19 @@ int parse_failed(const CLI::App& program, const CLI::ParseError& error) {
     return program.exit(error);  // --help, --version
   }
   const auto commands = program.get_subcommands();
-  util::log_error(error.what());
+  const bool extras = dynamic_cast<const CLI::ExtrasError*>(&error) != nullptr;
+  if (extras && commands.empty()) {
+    std::vector<std::string> names;
+    for (const CLI::App* command : program.get_subcommands([](const CLI::App*) { return true; })) {
+      names.push_back(command->get_name());
+    }
+    util::log_error(fmt::format("\"{}\" is no command; there are {}",
+                                program.remaining(true).front(), fmt::join(names, ", ")));
+  } else if (extras) {
+    util::log_error(fmt::format("not expected: {}", fmt::join(program.remaining(true), " ")));
+  } else {
+    util::log_error(error.what());
+  }
   fmt::print(stderr, "octrace: \"octrace{}{} --help\" says what it takes\n",
              commands.empty() ? "" : " ", commands.empty() ? "" : commands.front()->get_name());
   return static_cast<int>(Exit::usage);

@@ -17,10 +17,10 @@ util::Error no_such_camera(const std::string& choice, const scene::Scene& scene)
   for (std::size_t i = 0; i < scene.cameras.size(); ++i) {
     there += fmt::format("{}{} ({})", i > 0 ? ", " : "", i, scene.cameras[i].name);
   }
+  if (there.empty()) there = "none: without --camera the whole scene is framed";
   return {util::Exit::usage, "",
-          fmt::format("--camera {}: there is no such camera; the scene has {}", choice,
-                      there.empty() ? "none" : there),
-          "", ""};
+          fmt::format("--camera {}: there is no such camera; the scene has {}", choice, there), "",
+          ""};
 }
 
 }  // namespace

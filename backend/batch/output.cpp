@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <set>
 
@@ -220,6 +221,26 @@ util::Result<void> check_writable(const std::string& path) {
   util::Result<util::AtomicFile> probe = util::AtomicFile::create(path);
   if (!probe) return probe.error();
   return {};
+}
+
+std::optional<std::string> depth_warning(const Output& output,
+                                         const render::Framebuffer& framebuffer,
+                                         double depth_scale) {
+  if (output.kind == FileKind::exr || is_array(output.kind)) return std::nullopt;
+  const Aov aov = only_aov(output.aovs);
+  if (encoding_of(aov) != image::Encoding::scaled16) return std::nullopt;
+  std::uint64_t hits = 0, lost = 0;
+  for (const float value : framebuffer.floats(aov)) {
+    if (!std::isfinite(value)) continue;
+    ++hits;
+    lost += !(image::scaled(value, depth_scale) < image::kBeyondScaled);
+  }
+  if (lost == 0) return std::nullopt;
+  return fmt::format(
+      "{}: {} of {} pixels that show something lie beyond {:.6g}, where 16 bits end at a depth "
+      "scale of {:g}, and read {}, as the background does; a smaller scale reaches further",
+      output.path, lost, hits, (image::kBeyondScaled - 1) / depth_scale, depth_scale,
+      image::kBeyondScaled);
 }
 
 util::Result<void> write_output(const Output& output, const render::Framebuffer& framebuffer,

@@ -54,6 +54,11 @@ bool needs_textures(const render::AovSet& aovs);
 using Metadata = std::vector<std::pair<std::string, std::string>>;
 // octrace:version, octrace:scene, octrace:camera.
 Metadata view_metadata(const std::string& scene_source, const scene::Camera& camera);
+// What to warn of before a depth plane becomes 16-bit integers: hits beyond their range, which read
+// as the background does. None: all fit, or the output is of another kind.
+std::optional<std::string> depth_warning(const Output& output,
+                                         const render::Framebuffer& framebuffer,
+                                         double depth_scale);
 util::Result<void> write_output(const Output& output, const render::Framebuffer& framebuffer,
                                 double depth_scale, const Metadata& metadata);
 

@@ -12,6 +12,7 @@
 #include "backend/batch/view_record.h"
 #include "backend/util/grouped_commit.h"
 #include "backend/util/interrupt.h"
+#include "backend/util/log.h"
 #include "backend/util/process.h"
 
 namespace octrace::batch {
@@ -277,6 +278,10 @@ Result<ordered_json> ViewWriter::write_files(const TracedView& view,
     if (scratch_) {
       file.path = fmt::format("{}{}-{}{}", scratch_->path(), view.view.index, members.size(),
                               std::filesystem::path(name).extension().string());
+    }
+    if (const auto warning = depth_warning(file, *view.framebuffer, plan_.job().depth_scale);
+        warning && !depth_warned_.test_and_set()) {
+      util::log_warning(fmt::format("{} (views after this one are not named)", *warning));
     }
     const auto write = [&] {
       return write_output(file, *view.framebuffer, plan_.job().depth_scale,

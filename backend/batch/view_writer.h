@@ -2,6 +2,7 @@
 // in the journal once its files are complete.
 #pragma once
 
+#include <atomic>
 #include <condition_variable>
 #include <deque>
 #include <functional>
@@ -88,6 +89,7 @@ class ViewWriter {
   std::condition_variable changed_;
   std::deque<TracedView> queue_;
   std::vector<std::unique_ptr<render::Framebuffer>> free_;
+  std::atomic_flag depth_warned_;
   // Framebuffers that are not used any more once the first one has come back.
   std::size_t spare_ = 0;
   bool writing_ = false;

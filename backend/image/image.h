@@ -3,6 +3,7 @@
 // scenes take to render.
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <span>
 #include <string>
@@ -52,6 +53,12 @@ enum class Encoding {
   scaled16,  // depth: round(value * scale), 65535 where it does not fit or nothing was hit
   index16,   // ids: as they are; an error where one exceeds 65535
 };
+
+// What scaled16 writes: 65535 in place of what is that or more, or is no number.
+inline constexpr std::uint16_t kBeyondScaled = 65535;
+inline double scaled(float value, double scale) {
+  return std::floor(static_cast<double>(value) * scale + 0.5);
+}
 
 void preload();  // starts loading the image library in the background; optional
 // Returns when a preload() that was begun has ended: a process must not run its exit handlers

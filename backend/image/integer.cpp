@@ -40,9 +40,9 @@ std::uint8_t unit_byte(float value) {
 }
 
 std::uint16_t scaled_word(float value, double scale) {
-  const double scaled = std::floor(static_cast<double>(value) * scale + 0.5);
-  if (!(scaled < 65535.0)) return 65535;  // infinity and NaN too
-  return static_cast<std::uint16_t>(std::max(scaled, 0.0));
+  const double word = scaled(value, scale);
+  if (!(word < kBeyondScaled)) return kBeyondScaled;  // infinity and NaN too
+  return static_cast<std::uint16_t>(std::max(word, 0.0));
 }
 
 float sample(const Channel& channel, std::size_t pixel) {

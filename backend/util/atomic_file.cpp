@@ -78,7 +78,16 @@ Result<AtomicFile> AtomicFile::create(const std::string& target) {
       (path.parent_path() / fmt::format(".{}{}XXXXXX{}", path.stem().string(), kMark, extension))
           .string();
   const int descriptor = ::mkstemps(temporary.data(), static_cast<int>(extension.size()));
-  if (descriptor < 0) return io_error(target, "cannot be created", errno);
+  if (descriptor < 0) {
+    const int error = errno;
+    const std::filesystem::path folder = path.parent_path();
+    if (error == ENOENT && !folder.empty() && !std::filesystem::exists(folder, ignored)) {
+      return Error{Exit::io, "IO_ERROR",
+                   fmt::format("cannot be created: there is no folder {}", folder.string()), target,
+                   ""};
+    }
+    return io_error(target, "cannot be created", error);
+  }
   ::fchmod(descriptor, 0666 & ~process_umask());  // mkstemps makes 0600
   ::close(descriptor);
   return AtomicFile(path.string(), std::move(temporary));

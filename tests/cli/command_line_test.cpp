@@ -44,6 +44,34 @@ TEST(Help, NeedsNoImageLibrary) {
   EXPECT_THAT(outcome.err, HasSubstr("liboctrace_image.so"));
 }
 
+TEST(CommandLine, SaysWhatIsNoCommandAndWhatIsNotExpected) {
+  const Outcome command = run({"rendr", "builtin:paper"});
+  EXPECT_EQ(command.exit_code, 2);
+  EXPECT_THAT(command.err, HasSubstr("\"rendr\" is no command; there are render, info"));
+  const Outcome option = run({"info", "builtin:paper", "--szie", "10x10"});
+  EXPECT_EQ(option.exit_code, 2);
+  EXPECT_THAT(option.err, HasSubstr("not expected: --szie 10x10"));
+}
+
+TEST(CommandLine, SaysThatAFolderIsMissing) {
+  Scratch scratch;
+  const Outcome outcome =
+      run({"render", "builtin:paper", "-o", scratch.path("no/a.npy"), "--aov", "Z"});
+  EXPECT_EQ(outcome.exit_code, 5);
+  EXPECT_THAT(outcome.err, HasSubstr("there is no folder " + scratch.path("no")));
+}
+
+TEST(CommandLine, WarnsOfDepthThatSixteenBitsCannotHold) {
+  Scratch scratch;
+  const auto render = [&](const char* scale) {
+    return run({"render", "builtin:paper", "-o", scratch.path("a.png"), "--aov", "Z", "--size",
+                "32x24", "--depth-scale", scale});
+  };
+  EXPECT_THAT(render("1e9").err, HasSubstr("of 1"));
+  EXPECT_THAT(render("1e9").err, HasSubstr("pixels that show something lie beyond"));
+  EXPECT_THAT(render("0.001").err, ::testing::Not(HasSubstr("warning")));
+}
+
 struct Wrong {
   std::vector<std::string> arguments;
   std::string said;
