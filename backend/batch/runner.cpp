@@ -324,11 +324,7 @@ Result<RunSummary> run_plan(const Plan& plan, const RunOptions& options) {
   }
   auto done = read_done(plan, meaning, options.shard);
   if (!done) return done.error();
-  if (!done->clean) {
-    remove_leftovers(plan, options.shard);
-  } else if (options.shard.count == 1) {
-    remove_result_leftovers(plan);  // of a merge that was killed
-  }
+  if (!done->clean) remove_leftovers(plan, options.shard);
 
   RunSummary summary;
   summary.broken_lines = done->broken_lines;

@@ -106,7 +106,7 @@ Result<ordered_json> read_header(const std::string& path) {
   return header;
 }
 
-// Temporary files of some outputs that nobody is making.
+// Temporary files of some outputs that nobody makes now, as the caller's lock ensures.
 class Leftovers {
  public:
   void add(const std::string& path) {

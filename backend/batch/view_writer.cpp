@@ -275,13 +275,10 @@ Result<ordered_json> ViewWriter::write_files(const TracedView& view,
   for (Output& file : plan_.files(view.view)) {
     const std::string name = file.path;
     const std::string folder = name.substr(0, name.rfind('/') + 1);
+    warn_of_depth(file, *view.framebuffer);
     if (scratch_) {
       file.path = fmt::format("{}{}-{}{}", scratch_->path(), view.view.index, members.size(),
                               std::filesystem::path(name).extension().string());
-    }
-    if (const auto warning = depth_warning(file, *view.framebuffer, plan_.job().depth_scale);
-        warning && !depth_warned_.test_and_set()) {
-      util::log_warning(fmt::format("{} (views after this one are not named)", *warning));
     }
     const auto write = [&] {
       return write_output(file, *view.framebuffer, plan_.job().depth_scale,
@@ -305,6 +302,14 @@ Result<ordered_json> ViewWriter::write_files(const TracedView& view,
     files.push_back({{"path", file.path.substr(plan_.folder().size())}, {"bytes", 0}});
   }
   return files;
+}
+
+// Once: what is true of one view is true of many.
+void ViewWriter::warn_of_depth(const Output& file, const render::Framebuffer& framebuffer) {
+  if (depth_warned_.test()) return;
+  const auto warning = depth_warning(file, framebuffer, plan_.job().depth_scale);
+  if (!warning || depth_warned_.test_and_set()) return;
+  util::log_warning(fmt::format("{} (other views are not named)", *warning));
 }
 
 void ViewWriter::note_scene(const ordered_json& line) {

@@ -65,6 +65,7 @@ class ViewWriter {
  private:
   void work();
   void write(TracedView& view);
+  void warn_of_depth(const Output& file, const render::Framebuffer& framebuffer);
   // Of a packed job the files end up in `members`.
   util::Result<nlohmann::ordered_json> write_files(const TracedView& view,
                                                    std::vector<PackMember>& members);

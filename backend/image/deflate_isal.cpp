@@ -1,4 +1,5 @@
 // By ISA-L, for ZIP archives and, through compress2(), for EXR files.
+#include <dlfcn.h>
 #include <isa-l/igzip_lib.h>
 #include <zlib.h>
 
@@ -15,8 +16,8 @@ namespace octrace::image {
 
 namespace {
 
-// Kept by each thread that compresses, which needs no image library for it: nobody waits for the
-// dynamic loader here but a first view whose library is still loading.
+// Kept by each thread that compresses. Its first use in a thread may wait for the dynamic loader
+// (TileRunner): a writer of images waits for their library anyway, and arrays alone load none.
 struct Workspace {
   isal_zstream stream;
   std::uint8_t level_buffer[ISAL_DEF_LVL1_DEFAULT];
@@ -72,24 +73,6 @@ std::size_t compress_whole(const Bytef* from, std::size_t size, void* to, std::s
   return stream.total_out;
 }
 
-int compress_by_zlib(Bytef* to, uLongf* to_size, const Bytef* from, uLong size, int level) {
-  constexpr uLong kMost = std::numeric_limits<uInt>::max();
-  z_stream stream{};
-  if (const int begun = ::deflateInit(&stream, level); begun != Z_OK) return begun;
-  stream.next_in = const_cast<Bytef*>(from);
-  stream.next_out = to;
-  uLong left = size, room = *to_size;
-  int outcome = Z_OK;
-  while (outcome == Z_OK) {
-    if (stream.avail_in == 0) left -= stream.avail_in = static_cast<uInt>(std::min(left, kMost));
-    if (stream.avail_out == 0) room -= stream.avail_out = static_cast<uInt>(std::min(room, kMost));
-    outcome = ::deflate(&stream, left > 0 ? Z_NO_FLUSH : Z_FINISH);
-  }
-  *to_size = stream.total_out;
-  ::deflateEnd(&stream);
-  return outcome == Z_STREAM_END ? Z_OK : outcome;
-}
-
 }  // namespace
 
 util::Result<void> deflate(std::span<const std::string_view> parts, const DeflateSink& sink) {
@@ -135,8 +118,9 @@ util::Result<void> deflate(std::span<const std::string_view> parts, const Deflat
 }  // namespace octrace::image
 
 // Takes the place of zlib's own in this process: OpenEXR compresses by it, offers no other way, and
-// spent two thirds of the time of an EXR file there. A program's symbols come before those of the
-// libraries that it loads. Only level 1, which asks for speed (exr.cpp), and only what fits.
+// spent more than half of the time of an EXR file there. A program's symbols come before those of
+// the libraries that it loads. Only level 1, which asks for speed (exr.cpp), and only what fits;
+// the rest is zlib's.
 extern "C" __attribute__((visibility("default"))) int compress2(Bytef* to, uLongf* to_size,
                                                                 const Bytef* from, uLong size,
                                                                 int level) {
@@ -147,5 +131,6 @@ extern "C" __attribute__((visibility("default"))) int compress2(Bytef* to, uLong
       return Z_OK;
     }
   }
-  return compress_by_zlib(to, to_size, from, size, level);
+  static const auto zlibs = reinterpret_cast<decltype(&compress2)>(::dlsym(RTLD_NEXT, "compress2"));
+  return zlibs(to, to_size, from, size, level);
 }

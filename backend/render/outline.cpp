@@ -2,12 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/geometric.hpp>
 
 namespace octrace::render {
 
 namespace {
 
-using Point = std::array<double, 3>;
+using glm::dvec3;
 
 // Of the largest coordinate; nothing here is more than 2 sqrt(3) of it away. Rounding moves a float
 // ray, and the corners by whose exact signs the triangle test takes or leaves it, by 2^-20 of it at
@@ -15,28 +16,20 @@ using Point = std::array<double, 3>;
 // that the whole ray lies beyond.)
 constexpr double kMargin = 4e-4;
 
-Point point(const kernels::Vec3& v) { return {v.x, v.y, v.z}; }
-Point minus(const Point& a, const Point& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
-double dot(const Point& a, const Point& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-Point cross(const Point& a, const Point& b) {
-  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
-bool is_zero(const kernels::Vec3& v) { return v.x == 0.0f && v.y == 0.0f && v.z == 0.0f; }
-
 }  // namespace
 
 Outline::Outline(const kernels::OctreeView& octree, const kernels::RayCamera& camera)
-    : at_zero_{point(camera.origin), point(camera.direction)},
-      along_x_{point(camera.origin_x), point(camera.direction_x)},
-      along_y_{point(camera.origin_y), point(camera.direction_y)},
-      perspective_(is_zero(camera.origin_x) && is_zero(camera.origin_y)),
-      orthographic_(is_zero(camera.direction_x) && is_zero(camera.direction_y)) {
+    : at_zero_{camera.origin, camera.direction},
+      along_x_{camera.origin_x, camera.direction_x},
+      along_y_{camera.origin_y, camera.direction_y},
+      perspective_(along_x_.origin == dvec3(0.0) && along_y_.origin == dvec3(0.0)),
+      orthographic_(along_x_.direction == dvec3(0.0) && along_y_.direction == dvec3(0.0)) {
   if (octree.nodes.size == 0) return;
   const kernels::Node& root = octree.nodes[0];
   for (int slot = 0; slot < kernels::kChildren; ++slot) {
     if (root.meta[slot] == 0) continue;
     Box& box = boxes_[static_cast<std::size_t>(box_count_++)];
-    for (std::size_t axis = 0; axis < 3; ++axis) {
+    for (int axis = 0; axis < 3; ++axis) {
       box.lower[axis] = root.origin[axis] + std::ldexp(root.lower[axis][slot], root.exponent[axis]);
       box.upper[axis] = root.origin[axis] + std::ldexp(root.upper[axis][slot], root.exponent[axis]);
     }
@@ -44,13 +37,8 @@ Outline::Outline(const kernels::OctreeView& octree, const kernels::RayCamera& ca
 }
 
 Outline::CornerRay Outline::corner(double x, double y) const {
-  CornerRay ray;
-  for (std::size_t i = 0; i < 3; ++i) {
-    ray.origin[i] = at_zero_.origin[i] + x * along_x_.origin[i] + y * along_y_.origin[i];
-    ray.direction[i] =
-        at_zero_.direction[i] + x * along_x_.direction[i] + y * along_y_.direction[i];
-  }
-  return ray;
+  return {at_zero_.origin + x * along_x_.origin + y * along_y_.origin,
+          at_zero_.direction + x * along_x_.direction + y * along_y_.direction};
 }
 
 bool Outline::may_see(const Tile& pixels) const {
@@ -63,16 +51,15 @@ bool Outline::may_see(const Tile& pixels) const {
   int left = box_count_;
   for (std::size_t i = 0; i < 4 && left > 0; ++i) {
     const CornerRay &from = corners[i], &to = corners[(i + 1) % 4];
-    Point normal = perspective_ ? cross(from.direction, to.direction)
-                                : cross(minus(to.origin, from.origin), from.direction);
+    dvec3 normal = perspective_ ? glm::cross(from.direction, to.direction)
+                                : glm::cross(to.origin - from.origin, from.direction);
     // The other corners, and so all rays between, are on its inner side.
     const auto side = [&](const CornerRay& ray) {
-      return perspective_ ? dot(normal, ray.direction)
-                          : dot(normal, minus(ray.origin, from.origin));
+      return glm::dot(normal, perspective_ ? ray.direction : ray.origin - from.origin);
     };
     const double a = side(corners[(i + 2) % 4]), b = side(corners[(i + 3) % 4]);
     if (a < 0.0 && b < 0.0) {
-      for (double& n : normal) n = -n;
+      normal = -normal;
     } else if (!(a > 0.0 && b > 0.0)) {
       continue;
     }
@@ -86,14 +73,14 @@ bool Outline::may_see(const Tile& pixels) const {
 }
 
 // Whether the box is on the outer side of the plane, with a margin. A number that is none: no.
-bool Outline::beyond(const Box& box, const Point& origin, const Point& normal) const {
-  Point nearest;
+bool Outline::beyond(const Box& box, const dvec3& origin, const dvec3& normal) const {
+  dvec3 nearest;
   double size = 0.0;  // of all that is rounded
-  for (std::size_t i = 0; i < 3; ++i) {
+  for (int i = 0; i < 3; ++i) {
     nearest[i] = (normal[i] > 0.0 ? box.upper[i] : box.lower[i]) - origin[i];
     size = std::max({size, std::fabs(box.lower[i]), std::fabs(box.upper[i]), std::fabs(origin[i])});
   }
-  return dot(normal, nearest) < -kMargin * size * std::sqrt(dot(normal, normal));
+  return glm::dot(normal, nearest) < -kMargin * size * glm::length(normal);
 }
 
 }  // namespace octrace::render

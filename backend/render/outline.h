@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <glm/vec3.hpp>
 
 #include "backend/render/tiles.h"
 #include "kernels/camera.h"
@@ -19,15 +20,14 @@ class Outline {
   bool may_see(const Tile& pixels) const;
 
  private:
-  using Point = std::array<double, 3>;
   struct CornerRay {
-    Point origin, direction;
+    glm::dvec3 origin, direction;
   };
   struct Box {
-    Point lower, upper;
+    glm::dvec3 lower, upper;
   };
   CornerRay corner(double x, double y) const;
-  bool beyond(const Box& box, const Point& origin, const Point& normal) const;
+  bool beyond(const Box& box, const glm::dvec3& origin, const glm::dvec3& normal) const;
 
   CornerRay at_zero_, along_x_, along_y_;
   bool perspective_, orthographic_;
