@@ -73,14 +73,20 @@ class Layout {
   Octree& octree_;
 };
 
+SahOptions sah_options(const BuildOptions& options) {
+  constexpr std::uint32_t kMost = kernels::kMaxLeafTriangles;
+  return {options.leaf == 0 ? kMost : std::min(options.leaf, kMost),
+          options.builder == Builder::quality, options.cuts};
+}
+
 // Sizes of the largest arrays alive at once while building; an upper estimate.
-std::uint64_t build_bytes(std::uint64_t triangles, Builder builder) {
-  if (builder == Builder::median) {
+std::uint64_t build_bytes(std::uint64_t triangles, const BuildOptions& options) {
+  if (options.builder == Builder::median) {
     constexpr std::uint64_t kReference = 32, kTreeNodes = sizeof(TreeNode) / 4, kId = 4;
     return triangles * (kReference + kTreeNodes + kId + sizeof(kernels::LeafTriangle) +
                         sizeof(kernels::Node) / 4);
   }
-  return sah_build_bytes(triangles, builder == Builder::quality);
+  return sah_build_bytes(triangles, sah_options(options));
 }
 
 BuildInput input_of(const scene::Scene& scene, std::span<const std::uint32_t> flags) {
@@ -119,7 +125,7 @@ const char* name_of(Builder builder) {
 }
 
 util::Result<Octree> build(const BuildInput& input, const BuildOptions& options) {
-  const std::uint64_t needed = build_bytes(input.triangles.size(), options.builder);
+  const std::uint64_t needed = build_bytes(input.triangles.size(), options);
   if (input.triangles.size() > 0x7fffffffu || needed > options.max_bytes) {
     return util::Error{util::Exit::limit, "",
                        fmt::format("the octree of {} triangles needs about {} bytes while it is "
@@ -130,9 +136,7 @@ util::Result<Octree> build(const BuildInput& input, const BuildOptions& options)
   Octree octree;
   const auto run = [&] {
     if (options.builder != Builder::median) {
-      constexpr std::uint32_t kMost = kernels::kMaxLeafTriangles;
-      build_sah(input, options.leaf == 0 ? kMost : std::min(options.leaf, kMost),
-                options.builder == Builder::quality, octree);
+      build_sah(input, sah_options(options), octree);
       return;
     }
     TreeArena arena;

@@ -1,6 +1,6 @@
 // For `--builder quality`: references go from one array to another, with room for the parts that
 // spatial splits make; subtrees of few references without spatial splits are left to one thread
-// each (object_split.cpp). Trees without cuts are made in less memory (top_tree.h).
+// each (object_split.cpp). The default builder cuts at the top only, in less memory (top_tree.h).
 //
 // The same tree for any number of threads: bins are filled by minima and integer sums, which do not
 // depend on order; references are scattered in order of fixed blocks; room is shared out by size.

@@ -1,14 +1,16 @@
 // Threads share nothing while they build subtrees: range [first, first + count) of the references
-// is replaced by the same range of leaf triangles, since each triangle lies in one leaf, and nodes
-// wait in the memory of their thread until all sizes are known. Then the top is planned and
-// written, and subtrees are copied to places that do not depend on threads: depth first, as all
-// other trees.
+// is replaced by as many leaf triangles. Those for which there is no reference in the array, as
+// triangles were cut, and the nodes wait in the memory of their thread until all sizes are known.
+// Then the top is planned and written, and subtrees are copied to places that do not depend on
+// threads: depth first, as all other trees.
 #include "backend/octree/build_subtrees.h"
 
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <cstring>
+#include <unordered_set>
 
 #include "backend/octree/blocks.h"
 #include "backend/octree/node_writer.h"
@@ -20,11 +22,12 @@ namespace {
 
 using kernels::kChildren;
 
-// A subtree's nodes, the root first; children are named by their places here.
+// A subtree's nodes, the root first; children and triangles are counted from 0.
 struct Chunk {
   const kernels::Node* nodes = nullptr;
   std::uint32_t size = 0;
   int height = 0;
+  std::unique_ptr<kernels::LeafTriangle[]> rest;  // leaf triangles after as many as references
 };
 
 class Workplace {
@@ -40,10 +43,18 @@ class Workplace {
     room_.build(range, options, references, nodes_.get(), local_.get());
     const float cost = plan_subtree(nodes_.get(), leaf_triangles);
     // Every node but a subtree's root has two children or more, so there are not more of them.
-    kernels::Node* const to = written_.reserve(range.count);
-    NodeWriter::Place place{1, range.first};
-    chunk.height = NodeWriter(nodes_.get(), input, local_.get(), to, triangles)
+    kernels::Node* const to = written_.reserve(range.size);
+    NodeWriter::Place place{1, 0};
+    kernels::LeafTriangle* const own = triangles + range.first;
+    const std::uint32_t rest = range.size - range.count;
+    kernels::LeafTriangle* const leaves = rest == 0 ? own : more_triangles();
+    chunk.height = NodeWriter(nodes_.get(), input, local_.get(), to, leaves)
                        .write_all(BinaryTree::kRoot, 0, place);
+    if (leaves != own) {
+      std::copy_n(leaves, range.count, own);
+      chunk.rest = std::make_unique_for_overwrite<kernels::LeafTriangle[]>(rest);
+      std::copy_n(leaves + range.count, rest, chunk.rest.get());
+    }
     chunk.nodes = to;
     chunk.size = place.node;
     written_.use(place.node);
@@ -51,23 +62,74 @@ class Workplace {
   }
 
  private:
+  kernels::LeafTriangle* more_triangles() {
+    if (!triangles_) {
+      triangles_ = std::make_unique_for_overwrite<kernels::LeafTriangle[]>(kMostInSubtree);
+    }
+    return triangles_.get();
+  }
+
   SubtreeRoom room_;
   std::unique_ptr<BinaryNode[]> nodes_;
   std::unique_ptr<LocalTriangle[]> local_;
+  std::unique_ptr<kernels::LeafTriangle[]> triangles_;
   Blocks<kernels::Node, 2 * kMostInSubtree> written_;
+};
+
+// The top as a binary tree whose leaves stand for ranges, and have their numbers.
+class TopNodes {
+ public:
+  // `is_leaf`: which ranges are to be leaves; all that are not split are.
+  template <class IsLeaf>
+  TopNodes(const TopTree& top, const IsLeaf& is_leaf) : nodes_(2), ranges_(2) {
+    list(*top.root, is_leaf, BinaryTree::kRoot);
+  }
+
+  BinaryNode* nodes() { return nodes_.data(); }
+  std::size_t size() const { return nodes_.size(); }
+  const TopRange& range(std::uint32_t node) const { return *ranges_[node]; }
+  const std::vector<const TopRange*>& leaves() const { return leaves_; }
+
+ private:
+  template <class IsLeaf>
+  void list(const TopRange& range, const IsLeaf& is_leaf, std::uint32_t root) {
+    ranges_[root] = &range;
+    if (range.lower == nullptr || is_leaf(range)) {
+      const auto number = static_cast<std::uint32_t>(leaves_.size());
+      write_node(nodes_[root], range.bounds, BinaryNode::kLeaf | number, 0);
+      leaves_.push_back(&range);
+      return;
+    }
+    const auto pair = static_cast<std::uint32_t>(nodes_.size() / 2);
+    write_node(nodes_[root], range.bounds, pair, 0);
+    nodes_.resize(nodes_.size() + 2);
+    ranges_.resize(nodes_.size());
+    list(*range.lower, is_leaf, 2 * pair);
+    list(*range.upper, is_leaf, 2 * pair + 1);
+  }
+
+  std::vector<BinaryNode> nodes_;
+  std::vector<const TopRange*> ranges_;  // by node
+  std::vector<const TopRange*> leaves_;
 };
 
 class TopWriter {
  public:
-  TopWriter(const std::vector<BinaryNode>& nodes, const std::vector<Chunk>& chunks,
-            const BuildInput& input, Octree& octree)
-      : nodes_(nodes), chunks_(chunks), input_(input), octree_(octree), sizes_(nodes.size()) {}
+  TopWriter(TopNodes& top, const std::vector<Chunk>& chunks, const BuildInput& input,
+            Octree& octree)
+      : nodes_(top.nodes()),
+        subtrees_(top.leaves()),
+        chunks_(chunks),
+        input_(input),
+        octree_(octree),
+        sizes_(top.size()) {}
 
   bool run() {
     if (measure(BinaryTree::kRoot, 1) > kernels::kMaxDepth) return false;
     octree_.nodes.resize(sizes_[BinaryTree::kRoot]);
-    const NodeWriter writer(nodes_.data(), input_, octree_.nodes.data(), octree_.triangles.data());
+    const NodeWriter writer(nodes_, input_, octree_.nodes.data(), octree_.triangles.data());
     write(writer, BinaryTree::kRoot, 0, 1);
+    spread_triangles();
     tbb::parallel_for(std::size_t{0}, jobs_.size(), [&](std::size_t i) { copy(jobs_[i]); });
     return true;
   }
@@ -86,7 +148,7 @@ class TopWriter {
       sizes_[index] = chunk.size;
       return depth + chunk.height - 1;
     }
-    const Family family(nodes_.data(), index);
+    const Family family(nodes_, index);
     sizes_[index] = 1;
     int lowest = depth;
     for (int i = 0; i < family.count; ++i) {
@@ -97,27 +159,45 @@ class TopWriter {
   }
 
   void write(const NodeWriter& writer, std::uint32_t index, std::uint32_t at, std::uint32_t below) {
-    const Family family(nodes_.data(), index);
+    if (nodes_[index].leaf()) {
+      jobs_.push_back({nodes_[index].triangle(), at, below});
+      return;
+    }
+    const Family family(nodes_, index);
     std::array<std::uint8_t, kChildren> order;
     NodeWriter::Place place{below, 0};
     const int inner = writer.write(family, at, place, order);
     for (int i = 0; i < inner; ++i, ++below) {
       const std::uint32_t child = family.index[order[i]];
-      if (nodes_[child].leaf()) {
-        jobs_.push_back({nodes_[child].triangle(), below, place.node});
-      } else {
-        write(writer, child, below, place.node);
-      }
+      write(writer, child, below, place.node);
       place.node += sizes_[child] - 1;
     }
   }
 
   void copy(const Job& job) {
     const Chunk& chunk = chunks_[job.subtree];
-    copy_subtree(chunk.nodes, chunk.size, octree_.nodes.data(), job.root, {job.below, 0});
+    copy_subtree(chunk.nodes, chunk.size, octree_.nodes.data(), job.root,
+                 {job.below, subtrees_[job.subtree]->place});
   }
 
-  const std::vector<BinaryNode>& nodes_;
+  // Makes room in front of the leaf triangles for what others have more than references, from the
+  // last to the first, since all move up.
+  void spread_triangles() {
+    octree_.triangles.resize(subtrees_.back()->place + subtrees_.back()->size);
+    kernels::LeafTriangle* const triangles = octree_.triangles.data();
+    for (std::size_t i = subtrees_.size(); i-- > 0;) {
+      const TopRange& range = *subtrees_[i];
+      if (range.place != range.first) {
+        std::memmove(triangles + range.place, triangles + range.first,
+                     range.count * sizeof(kernels::LeafTriangle));
+      }
+      std::copy_n(chunks_[i].rest.get(), range.size - range.count,
+                  triangles + range.place + range.count);
+    }
+  }
+
+  const BinaryNode* const nodes_;
+  const std::vector<const TopRange*>& subtrees_;
   const std::vector<Chunk>& chunks_;
   const BuildInput& input_;
   Octree& octree_;
@@ -125,33 +205,40 @@ class TopWriter {
   std::vector<Job> jobs_;
 };
 
-// The top alone as a binary tree, whose leaves have the numbers of subtrees.
-void list(const TopRange& range, std::uint32_t root, std::vector<BinaryNode>& nodes) {
-  if (range.lower == nullptr) {
-    write_node(nodes[root], range.bounds, BinaryNode::kLeaf | range.subtree, 0);
+// Adds the topmost ranges that are small enough for a subtree, and are likely to be eight-way nodes
+// in the cheapest tree; and units that are not, for want of a better one.
+void add_subtrees(const TopNodes& top, const BinaryNode* nodes, std::uint32_t root,
+                  std::unordered_set<const TopRange*>& subtrees) {
+  const TopRange& range = top.range(root);
+  if (range.size <= kMostInSubtree) {
+    subtrees.insert(&range);
     return;
   }
-  const auto pair = static_cast<std::uint32_t>(nodes.size() / 2);
-  write_node(nodes[root], range.bounds, pair, 0);
-  nodes.resize(nodes.size() + 2);
-  list(*range.lower, 2 * pair, nodes);
-  list(*range.upper, 2 * pair + 1, nodes);
+  const Family family(nodes, root);
+  for (int i = 0; i < family.count; ++i) add_subtrees(top, nodes, family.index[i], subtrees);
+}
+
+TopNodes choose_subtrees(const TopTree& top) {
+  TopNodes units(top, [](const TopRange&) { return false; });
+  guess_top(units.nodes());
+  std::unordered_set<const TopRange*> subtrees;
+  add_subtrees(units, units.nodes(), BinaryTree::kRoot, subtrees);
+  return TopNodes(top, [&](const TopRange& range) { return subtrees.contains(&range); });
 }
 
 }  // namespace
 
 bool build_subtrees(const TopTree& top, const TopOptions& options, std::uint32_t leaf_triangles,
                     const BuildInput& input, const LooseReference* references, Octree& octree) {
-  std::vector<Chunk> chunks(top.subtrees.size());
-  std::vector<float> costs(top.subtrees.size());
+  TopNodes nodes = choose_subtrees(top);
+  std::vector<Chunk> chunks(nodes.leaves().size());
+  std::vector<float> costs(chunks.size());
   tbb::enumerable_thread_specific<Workplace> workplaces;
-  tbb::parallel_for(std::size_t{0}, top.subtrees.size(), [&](std::size_t i) {
-    costs[i] = workplaces.local().build(*top.subtrees[i], options, leaf_triangles, input,
+  tbb::parallel_for(std::size_t{0}, chunks.size(), [&](std::size_t i) {
+    costs[i] = workplaces.local().build(*nodes.leaves()[i], options, leaf_triangles, input,
                                         references, octree.triangles.data(), chunks[i]);
   });
-  std::vector<BinaryNode> nodes(2);
-  list(*top.root, BinaryTree::kRoot, nodes);
-  plan_top(nodes.data(), costs.data());
+  plan_top(nodes.nodes(), costs.data());
   return TopWriter(nodes, chunks, input, octree).run();
 }
 

@@ -1,4 +1,4 @@
-// The fast way from the top of a binary tree to an octree.
+// From the top of a binary tree to an octree.
 #pragma once
 
 #include "backend/octree/octree.h"
@@ -6,11 +6,12 @@
 
 namespace octrace::octree {
 
-// Each range of references is built, planned and written by one thread while it is in its cache,
-// and its root is an eight-way node of its own, which costs at most a few percent more nodes a ray:
-// the whole binary tree never exists. `references` lie in the memory of the octree's triangles,
-// which are written over them. False: the octree would be deeper than kMaxDepth; what is in it is
-// of no use. Needs at least two ranges.
+// Subtrees of a few units are each built, planned and written by one thread while they are in its
+// cache: the whole binary tree never exists. Roots of subtrees are eight-way nodes; which ranges
+// those are to be is guessed beforehand, so well that rays visit no more nodes than in a tree that
+// was planned as a whole (docs/performance.md). `references` lie in the memory of the octree's
+// triangles, which are written over them. False: the octree would be deeper than kMaxDepth; what is
+// in it is of no use.
 bool build_subtrees(const TopTree& top, const TopOptions& options, std::uint32_t leaf_triangles,
                     const BuildInput& input, const LooseReference* references, Octree& octree);
 

@@ -15,17 +15,16 @@ namespace octrace::octree {
 TreeNode* build_median(const BuildInput& input, std::uint32_t leaf_vertices, TreeArena& arena,
                        std::vector<std::uint32_t>& ids);
 
-// From how many triangles on subtrees are built in cache (build_subtrees.h). That takes a sixth
-// less time, and of smaller scenes some would pay for it with up to 4 % more nodes a ray
-// (docs/performance.md); larger ones hardly do.
-inline constexpr std::uint32_t kLeastForSubtrees = 1u << 17;
+struct SahOptions {
+  std::uint32_t leaf_triangles = kernels::kMaxLeafTriangles;
+  bool quality = false;  // more time for fewer tests a ray
+  bool cuts = true;      // BuildOptions::cuts
+};
 
-// By the surface-area heuristic: a binary tree, improved and collapsed. `quality`: more time for
-// fewer tests a ray.
-void build_sah(const BuildInput& input, std::uint32_t leaf_triangles, bool quality, Octree& octree,
-               std::uint32_t least_for_subtrees = kLeastForSubtrees);
+// By the surface-area heuristic: a binary tree, collapsed into eight-way nodes.
+void build_sah(const BuildInput& input, const SahOptions& options, Octree& octree);
 // The most memory that takes beside the scene, the octree included.
-std::uint64_t sah_build_bytes(std::uint64_t triangles, bool quality);
+std::uint64_t sah_build_bytes(std::uint64_t triangles, const SahOptions& options);
 
 inline Box triangle_box(const BuildInput& input, std::uint32_t triangle) {
   const kernels::Triangle& t = input.triangles[triangle];

@@ -43,6 +43,11 @@ HWY_ATTR HWY_INLINE Eight lesser(const Eight& a, const Eight& b) {
   for (std::size_t i = 0; i < kParts; ++i) v.part[i] = hn::Min(a.part[i], b.part[i]);
   return v;
 }
+HWY_ATTR HWY_INLINE Eight greater(const Eight& a, const Eight& b) {
+  Eight v;
+  for (std::size_t i = 0; i < kParts; ++i) v.part[i] = hn::Max(a.part[i], b.part[i]);
+  return v;
+}
 // The least of the eight, in all lanes.
 HWY_ATTR HWY_INLINE Vector least_of(const Eight& v) {
   Vector all = v.part[0];

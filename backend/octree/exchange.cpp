@@ -27,13 +27,13 @@ void swap_all_but_notes(LooseReference& a, LooseReference& b) {
 
 }  // namespace
 
-void Half::search(const LooseSplitter& splitter, const Binning& binning, const ObjectSplit& split) {
+void Half::search(const LooseSplitter& splitter, const SidePlane& plane) {
   first_number_.assign(blocks_of(count_) + 1, 0);
   std::vector<std::array<Bounds8, 2>> bounds(blocks_of(count_));
   for_blocks(count_, [&](std::uint32_t block, std::uint32_t first, std::uint32_t count) {
     Bounds8 own[2];
     first_number_[block + 1] =
-        splitter.find_misplaced(references_ + first, count, upper_, binning, split, own);
+        splitter.find_misplaced(references_ + first, count, upper_, plane, own);
     bounds[block] = {own[0], own[1]};
   });
   for (std::size_t i = 1; i < first_number_.size(); ++i) first_number_[i] += first_number_[i - 1];

@@ -17,7 +17,7 @@ class Half {
 
   // Finds the strangers, and numbers them in their order. Threads write the notes of their own
   // blocks' references.
-  void search(const LooseSplitter& splitter, const Binning& binning, const ObjectSplit& split);
+  void search(const LooseSplitter& splitter, const SidePlane& plane);
 
   std::uint32_t misplaced() const { return first_number_.back(); }
   // Of what is in this half and belongs to a side.

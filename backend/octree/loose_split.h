@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "backend/octree/object_split.h"
+#include "backend/octree/spatial_split.h"
 
 namespace octrace::octree {
 
@@ -14,7 +15,10 @@ struct LooseSplitter {
   // reference becomes the place of the i-th such one. Returns how many there are; adds to the
   // bounds of the lower and the upper side what belongs there.
   std::uint32_t (*find_misplaced)(LooseReference*, std::uint32_t count, bool on_upper_side,
-                                  const Binning&, const ObjectSplit&, Bounds8 (&bounds)[2]);
+                                  const SidePlane&, Bounds8 (&bounds)[2]);
+  // Bins of space. Triangles that lie in several are cut there as their boxes are.
+  void (*fill_space)(const BuildInput&, const LooseReference*, std::uint32_t count,
+                     const SpatialBinning&, SpatialBins&);
   void (*pack)(const LooseReference*, std::uint32_t count, Reference* to);
 
   LooseSplitter();  // for the instruction set of this machine

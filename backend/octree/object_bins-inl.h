@@ -104,23 +104,6 @@ HWY_ATTR HWY_INLINE ObjectSplit best_split(const ObjectBins& bins, int count) {
   return split;
 }
 
-// Whether a reference goes to the lower side. A bin is a position without its fraction, and the
-// first bin of the upper side is a whole number, so the fractions make no difference.
-struct Plane {
-  int axis;
-  float low, scale, first_upper;
-
-  Plane(const Binning& binning, const ObjectSplit& split)
-      : axis(split.axis),
-        low(binning.lower[axis]),
-        scale(binning.scale[axis]),
-        first_upper(static_cast<float>(split.bin)) {}
-  template <class R>
-  float position(const R& reference) const {
-    return (reference.centre2(axis) - low) * scale;
-  }
-};
-
 // The bounds of both sides, gathered without branches on the side.
 struct TwoBounds {
   Box8 box[2], centres[2];

@@ -39,13 +39,14 @@ HWY_ATTR ObjectSplit best(const ObjectBins& bins, int count) {
     shared[axis] = std::min(-a[4 + axis], -b[4 + axis]) - std::max(a[axis], b[axis]);
     if (shared[axis] < 0.0f) return split;
   }
-  split.overlap = shared[0] * shared[1] + shared[1] * shared[2] + shared[2] * shared[0];
+  const int axis = split.axis;
+  split.overlap = shared[axis] * (shared[(axis + 1) % 3] + shared[(axis + 2) % 3]);
   return split;
 }
 
 HWY_ATTR std::uint32_t count_lower(const Reference* references, std::uint32_t count,
                                    const Binning& binning, const ObjectSplit& split) {
-  const Plane plane(binning, split);
+  const SidePlane plane(binning, split);
   std::uint32_t lower = 0;
   for (std::uint32_t i = 0; i < count; ++i)
     lower += plane.position(references[i]) < plane.first_upper;
@@ -53,7 +54,7 @@ HWY_ATTR std::uint32_t count_lower(const Reference* references, std::uint32_t co
 }
 
 HWY_ATTR void scatter(Scatter& work, const Binning& binning, const ObjectSplit& split) {
-  const Plane plane(binning, split);
+  const SidePlane plane(binning, split);
   TwoBounds bounds;
   Reference *low = work.low, *high = work.high;
   for (std::uint32_t i = 0; i < work.count; ++i) {
@@ -119,7 +120,7 @@ class Subtree {
   HWY_ATTR std::uint32_t partition(Reference* references, std::uint32_t count,
                                    const Binning& binning, const ObjectSplit& chosen,
                                    Bounds8& lower_bounds, Bounds8& upper_bounds) {
-    const Plane plane(binning, chosen);
+    const SidePlane plane(binning, chosen);
     TwoBounds bounds;
     std::uint32_t lower = 0, upper = 0;
     Reference* const spare = range_.spare;

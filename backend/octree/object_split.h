@@ -48,7 +48,35 @@ struct ObjectSplit {
   float cost = std::numeric_limits<float>::infinity();  // areas times references
   int axis = -1;                                        // -1: none
   int bin = 0;                                          // the first bin of the upper side
-  float overlap = 0.0f;  // half the surface of what the two sides' boxes share
+  // Half the surface of what the two sides' boxes share, less the faces towards the sides, which
+  // any two neighbours share.
+  float overlap = 0.0f;
+};
+
+// Whether a reference goes to the lower side, by its centre.
+struct SidePlane {
+  int axis;
+  float low, scale, first_upper;
+
+  // A bin is a position without its fraction, and the first bin of the upper side is a whole
+  // number, so the fractions make no difference.
+  SidePlane(const Binning& binning, const ObjectSplit& split)
+      : axis(split.axis),
+        low(binning.lower[axis]),
+        scale(binning.scale[axis]),
+        first_upper(static_cast<float>(split.bin)) {}
+  // A plane in space.
+  SidePlane(int of_axis, float at)
+      : axis(of_axis), low(0.0f), scale(1.0f), first_upper(2.0f * at) {}
+
+  template <class R>
+  float position(const R& reference) const {
+    return (reference.centre2(axis) - low) * scale;
+  }
+  template <class R>
+  bool lower_side(const R& reference) const {
+    return position(reference) < first_upper;
+  }
 };
 
 // What a split does to a run of references. `low` and `high` say where those of either side go, in

@@ -25,5 +25,8 @@ bool plan(BinaryNode* nodes, std::uint32_t leaf_triangles);
 float plan_subtree(BinaryNode* nodes, std::uint32_t leaf_triangles);
 // The same where leaf i stands for a subtree that takes one slot at cost costs[i].
 void plan_top(BinaryNode* nodes, const float* costs);
+// The same where leaves stand for subtrees that are not built yet: what they cost more or less in
+// any number of slots is guessed from their surface.
+void guess_top(BinaryNode* nodes);
 
 }  // namespace octrace::octree

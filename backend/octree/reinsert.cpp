@@ -43,10 +43,9 @@ class Reinserter {
     std::vector<Index> candidates = largest(count);
     float first_gain = 0.0f;
     for (int i = 0; i < options.rounds && !candidates.empty(); ++i) {
-      const float gain = round(candidates, options);
+      const float gain = round(candidates);
       if (i == 0) first_gain = gain;
       if (!(gain > options.last_gain * first_gain)) return;
-      if (!options.follow) candidates = largest(count);
     }
   }
 
@@ -54,7 +53,7 @@ class Reinserter {
   // Moves what can be moved, and leaves in `candidates` those worth another look: moves that stood
   // in each other's way, and the nodes about those that were made. Returns by how much the sum of
   // surfaces fell.
-  float round(std::vector<Index>& candidates, const ReinsertOptions& options) {
+  float round(std::vector<Index>& candidates) {
     std::vector<Move> moves(candidates.size());
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, candidates.size(), 16),
                       [&](const auto& range) {
@@ -64,12 +63,6 @@ class Reinserter {
                         }
                       });
     std::erase_if(moves, [](const Move& move) { return move.gain <= 0.0f; });
-    float gain = 0.0f;
-    for (const Move& move : moves) gain += move.gain;
-    if (!worth_it_) {
-      if (!(gain > options.least_gain * nodes_[kRoot].half_area())) return 0.0f;
-      worth_it_ = true;
-    }
     // Before anything moves: the searches saw this tree.
     for (const Move& move : moves) link(move);
     std::sort(moves.begin(), moves.end(), [](const Move& a, const Move& b) {
@@ -238,7 +231,6 @@ class Reinserter {
   BinaryNode* nodes_;
   std::unique_ptr<Index[]> parents_;
   std::uint32_t references_;
-  bool worth_it_ = false;      // the first round gained enough
   std::vector<bool> touched_;  // by moves of this round
   std::vector<Index> touched_list_;
 };

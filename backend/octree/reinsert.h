@@ -6,12 +6,9 @@ namespace octrace::octree {
 
 struct ReinsertOptions {
   int rounds = 0;
-  float share = 0.01f;  // of the nodes, those of the largest surfaces, that each round looks at
-  // Nothing is moved where the first round's moves would take less than this part of the root's
-  // surface off the sum.
-  float least_gain = 0.0f;
-  // Later rounds look only at what the one before left undone or changed.
-  bool follow = false;
+  // Of the nodes, those of the largest surfaces, that the first round looks at; later ones look at
+  // what the one before left undone or changed.
+  float share = 0.01f;
   float last_gain = 0.0f;  // a round that gains at most this part of the first is the last
 };
 

@@ -16,11 +16,7 @@ struct Cutter {
   float padding;
   float margin;
 
-  Cutter(const BuildInput& input, const Reference& reference) {
-    const kernels::Triangle& t = input.triangles[reference.triangle];
-    corners[0] = input.positions[t.a];
-    corners[1] = input.positions[t.b];
-    corners[2] = input.positions[t.c];
+  Cutter(const Vec3& first, const Vec3& second, const Vec3& third) : corners{first, second, third} {
     float side = 0.0f, largest = 0.0f;
     for (int a = 0; a < 3; ++a) {
       const float lower = std::min({corners[0][a], corners[1][a], corners[2][a]});
@@ -75,10 +71,40 @@ void join_box(Bounds8& bounds, const Reference& reference) {
   }
 }
 
-// A ray is dimmed once by a BLEND triangle, so that must be in one leaf.
 bool may_cut(const BuildInput& input, const Reference& reference) {
-  return input.flags.empty() || input.triangle_geometry.empty() ||
-         (input.flags[input.triangle_geometry[reference.triangle]] & kernels::kBlend) == 0;
+  return input.triangle_geometry.empty() ||
+         may_cut(input, input.triangle_geometry[reference.triangle]);
+}
+bool may_cut(const BuildInput& input, const LooseReference& reference) {
+  return may_cut(input, reference.corners.geometry);
+}
+
+Cutter cutter_of(const BuildInput& input, const Reference& reference) {
+  const kernels::Triangle& t = input.triangles[reference.triangle];
+  return {input.positions[t.a], input.positions[t.b], input.positions[t.c]};
+}
+Cutter cutter_of(const BuildInput& input, const LooseReference& reference) {
+  const Corners& own = reference.corners;
+  return {input.positions[own.a], input.positions[own.b], input.positions[own.c]};
+}
+
+// Parts are told from triangles by their boxes.
+Reference box_of(const LooseReference& from, const Cutter& cutter) {
+  Reference box{{from.lower[0], from.lower[1], from.lower[2]},
+                from.triangle,
+                {from.negated_upper[0], from.negated_upper[1], from.negated_upper[2]},
+                0};
+  Box whole;
+  for (const Vec3& corner : cutter.corners) whole.add(float4(corner));
+  for (int axis = 0; axis < 3; ++axis) {
+    if (box.lower[axis] != whole.lower[axis] || box.upper(axis) != whole.upper[axis]) box.part = 1;
+  }
+  return box;
+}
+
+void set_box(LooseReference& reference, const Reference& box) {
+  std::copy_n(box.lower, 3, reference.lower);
+  std::copy_n(box.negated_upper, 3, reference.negated_upper);
 }
 
 }  // namespace
@@ -86,7 +112,19 @@ bool may_cut(const BuildInput& input, const Reference& reference) {
 bool cut(const BuildInput& input, const Reference& reference, int axis, float plane,
          Reference* lower, Reference* upper) {
   return may_cut(input, reference) &&
-         Cutter(input, reference).cut(reference, axis, plane, lower, upper);
+         cutter_of(input, reference).cut(reference, axis, plane, lower, upper);
+}
+
+bool cut(const BuildInput& input, const LooseReference& reference, int axis, float plane,
+         LooseReference* lower, LooseReference* upper) {
+  if (!may_cut(input, reference)) return false;
+  const Cutter cutter = cutter_of(input, reference);
+  Reference below, above;
+  if (!cutter.cut(box_of(reference, cutter), axis, plane, &below, &above)) return false;
+  *lower = *upper = reference;
+  set_box(*lower, below);
+  set_box(*upper, above);
+  return true;
 }
 
 SpatialBinning::SpatialBinning(const Bounds8& bounds, int bin_count) : bins(bin_count) {
@@ -97,6 +135,7 @@ SpatialBinning::SpatialBinning(const Bounds8& bounds, int bin_count) : bins(bin_
     // A denormal extent overflows the quotient; no plane divides such an axis.
     if (!(scale[axis] < std::numeric_limits<float>::max())) extent[axis] = scale[axis] = 0.0f;
   }
+  lower[3] = scale[3] = 0.0f;
 }
 
 float SpatialBinning::plane(int axis, int bin) const {
@@ -129,7 +168,7 @@ void fill(const BuildInput& input, const Reference* references, std::uint32_t co
       int at = first;
       if (first != last && !whole_only && !cutter) {
         whole_only = !may_cut(input, whole);
-        if (!whole_only) cutter.emplace(input, whole);
+        if (!whole_only) cutter.emplace(cutter_of(input, whole));
       }
       if (first == last || whole_only) {
         join_box(bins.parts[axis][at], whole);

@@ -18,9 +18,9 @@ namespace octrace::octree {
 
 // Planes at equal distances between the bounds of a range.
 struct SpatialBinning {
-  float lower[3];
+  float lower[4];
   float extent[3];  // 0: not to be divided
-  float scale[3];
+  float scale[4];
   int bins;
 
   SpatialBinning(const Bounds8& bounds, int bin_count);
@@ -44,11 +44,19 @@ struct SpatialSplit {
   float plane = 0.0f;
 };
 
+// A ray is dimmed once by a BLEND triangle, so that must be in one leaf.
+inline bool may_cut(const BuildInput& input, std::uint32_t geometry) {
+  return input.flags.empty() || (input.flags[geometry] & kernels::kBlend) == 0;
+}
+
 // Cuts the reference in two. False, and both untouched: it may not be cut, or one part would be no
 // smaller than the reference.
 bool cut(const BuildInput& input, const Reference& reference, int axis, float plane,
          Reference* lower, Reference* upper);
+bool cut(const BuildInput& input, const LooseReference& reference, int axis, float plane,
+         LooseReference* lower, LooseReference* upper);
 
+// Adds references to the bins, cut at all planes.
 void fill(const BuildInput& input, const Reference* references, std::uint32_t count,
           const SpatialBinning& binning, SpatialBins& bins);
 SpatialSplit best(const SpatialBins& bins, const SpatialBinning& binning);

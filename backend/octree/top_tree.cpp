@@ -4,7 +4,6 @@
 #include "backend/octree/top_tree.h"
 
 #include <tbb/blocked_range.h>
-#include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_invoke.h>
 #include <tbb/parallel_reduce.h>
 
@@ -18,14 +17,9 @@ namespace octrace::octree {
 
 namespace {
 
-// From how few references on a range is a subtree. Its root is an eight-way node of its own, so
-// above it there should be room for whole levels of those, as in a tree of triangles / 8^m each;
-// half as many more, because halves are uneven. Other sizes up to the most gave up to a tenth more
-// nodes a ray.
-std::uint32_t subtree_size(std::uint32_t triangles) {
-  std::uint64_t size = std::uint64_t{3} * triangles / 2;
-  while (size > kMostInSubtree) size /= kernels::kChildren;
-  return static_cast<std::uint32_t>(std::max<std::uint64_t>(size, 1));
+// Cuts are made between units only, so that scenes of few triangles need small ones.
+std::uint32_t unit_size(std::uint32_t triangles) {
+  return std::clamp<std::uint32_t>(triangles / 64, 64, kMostInUnit);
 }
 
 class TopSplitter {
@@ -34,17 +28,19 @@ class TopSplitter {
       : input_(input),
         options_(options),
         references_(references),
-        subtree_(subtree_size(static_cast<std::uint32_t>(input.triangles.size()))) {}
+        unit_(unit_size(static_cast<std::uint32_t>(input.triangles.size()))) {}
 
   TopTree run() {
     TopTree tree;
     tree.root = std::make_unique<TopRange>();
     TopRange& root = *tree.root;
     root.count = static_cast<std::uint32_t>(input_.triangles.size());
+    root.room = static_cast<std::uint32_t>(
+        std::min(double{options_.duplicates} * root.count, 0x7fffffff - double(root.count)));
     root.bounds = make_references(root.count);
-    const float overlap = split(root), area = root.bounds.half_area();
-    tree.overlap = area > 0.0f ? overlap / area : 0.0f;
-    list(root, tree.subtrees);
+    root_area_ = root.bounds.half_area();
+    split(root);
+    number(root, 0);
     return tree;
   }
 
@@ -84,56 +80,77 @@ class TopSplitter {
     return bounds;
   }
 
-  // Half the surface of what the sides of a split share, less the faces towards the sides, which
-  // any two neighbours share.
-  static float lateral_overlap(const Bounds8& lower, const Bounds8& upper, int axis) {
-    float shared[3];
-    for (int i = 0; i < 3; ++i) {
-      shared[i] =
-          std::min(lower.upper(i), upper.upper(i)) - std::max(lower.lower(i), upper.lower(i));
-      if (!(shared[i] > 0.0f)) return 0.0f;
-    }
-    return shared[axis] * (shared[(axis + 1) % 3] + shared[(axis + 2) % 3]);
-  }
-
-  // Returns the most that the two sides of a split share.
-  float split(TopRange& range) {
-    if (range.count <= subtree_) return 0.0f;
+  void split(TopRange& range) {
+    if (total(range) <= unit_) return;
     range.lower = std::make_unique<TopRange>();
     range.upper = std::make_unique<TopRange>();
     TopRange &lower = *range.lower, &upper = *range.upper;
-    float overlap = divide(range, lower, upper);
+    divide(range, lower, upper);
     lower.first = range.first;
     upper.first = range.first + lower.count;
     upper.count = range.count - lower.count;
     lower.depth = upper.depth = range.depth + 1;
-    float below[2];
-    tbb::parallel_invoke([&] { below[0] = split(lower); }, [&] { below[1] = split(upper); });
-    return std::max({overlap, below[0], below[1]});
+    lower.room = static_cast<std::uint32_t>(std::uint64_t{range.room} * total(lower) /
+                                            (std::uint64_t{total(lower)} + total(upper)));
+    upper.room = range.room - lower.room;
+    Parts().swap(range.parts);
+    tbb::parallel_invoke([&] { split(lower); }, [&] { split(upper); });
   }
 
-  // Sorts the references, counts those of the lower side and finds both sides' bounds. Returns what
-  // the sides share.
-  float divide(const TopRange& range, TopRange& lower, TopRange& upper) {
-    LooseReference* const references = references_ + range.first;
+  // Sorts the references, counts those of the lower side and finds both sides' bounds.
+  void divide(TopRange& range, TopRange& lower, TopRange& upper) {
     if (range.depth < options_.sah_depth) {
       const Binning binning(range.bounds, options_.bins);
-      const ObjectBins bins = fill(references, range.count, binning);
+      const ObjectBins bins = fill(range, binning);
       const ObjectSplit chosen = splitter_.best(bins, binning.bins);
+      if (range.room != 0 && chosen.overlap > options_.least_overlap * root_area_ &&
+          divide_space(range, chosen.cost, lower, upper)) {
+        return;
+      }
       if (chosen.axis >= 0) {
+        const SidePlane plane(binning, chosen);
         for (int bin = 0; bin < chosen.bin; ++bin) lower.count += bins.counts[chosen.axis][bin];
-        if (part(references, range.count, lower.count, binning, chosen, lower.bounds,
-                 upper.bounds)) {
-          return lateral_overlap(lower.bounds, upper.bounds, chosen.axis);
-        }
+        for (const LooseReference& part : range.parts) lower.count -= plane.lower_side(part);
+        if (part(range, plane, lower, upper)) return;
       }
     }
-    lower.count = split_by_rank(references, range.count, range.bounds);
-    lower.bounds = loose_.bounds(references, lower.count);
-    upper.bounds = loose_.bounds(references + lower.count, range.count - lower.count);
-    return 0.0f;
+    divide_by_rank(range, lower, upper);
   }
 
+  // False, and nothing changed: that would not be cheaper.
+  bool divide_space(TopRange& range, float cost, TopRange& lower, TopRange& upper) const {
+    const LooseRange loose{references_ + range.first, range.count, range.parts};
+    const SpatialSplit chosen =
+        best_cut(input_, loose_, loose, range.bounds, options_.spatial_bins);
+    if (!(chosen.cost < cost)) return false;
+    const std::size_t before = range.parts.size();
+    const std::uint32_t below = cut_at(input_, loose, range.room, chosen);
+    if (below == kernels::kNone) return false;
+    range.room -= static_cast<std::uint32_t>(range.parts.size() - before);
+    lower.count = below;
+    return part(range, SidePlane(chosen.axis, chosen.plane), lower, upper);
+  }
+
+  void divide_by_rank(TopRange& range, TopRange& lower, TopRange& upper) const {
+    LooseReference* const references = references_ + range.first;
+    lower.count = split_by_rank(references, range.count, range.bounds);
+    const auto half = range.parts.begin() + static_cast<std::ptrdiff_t>(range.parts.size() / 2);
+    lower.parts.assign(range.parts.begin(), half);
+    upper.parts.assign(half, range.parts.end());
+    lower.bounds = joined(loose_.bounds(references, lower.count), bounds_of(lower.parts));
+    upper.bounds = joined(loose_.bounds(references + lower.count, range.count - lower.count),
+                          bounds_of(upper.parts));
+  }
+
+  Bounds8 bounds_of(const Parts& parts) const {
+    return loose_.bounds(parts.data(), static_cast<std::uint32_t>(parts.size()));
+  }
+
+  ObjectBins fill(const TopRange& range, const Binning& binning) const {
+    ObjectBins bins = fill(references_ + range.first, range.count, binning);
+    loose_.fill(range.parts.data(), static_cast<std::uint32_t>(range.parts.size()), binning, bins);
+    return bins;
+  }
   ObjectBins fill(const LooseReference* references, std::uint32_t count,
                   const Binning& binning) const {
     ObjectBins bins;
@@ -154,59 +171,43 @@ class TopSplitter {
         });
   }
 
-  // False, and nothing moved, where the bins counted otherwise, which only numbers that are none
-  // could do.
-  bool part(LooseReference* references, std::uint32_t count, std::uint32_t lower_count,
-            const Binning& binning, const ObjectSplit& chosen, Bounds8& lower_bounds,
-            Bounds8& upper_bounds) const {
-    Half lower(references, lower_count, false);
-    Half upper(references + lower_count, count - lower_count, true);
-    tbb::parallel_invoke([&] { lower.search(loose_, binning, chosen); },
-                         [&] { upper.search(loose_, binning, chosen); });
-    if (lower.misplaced() != upper.misplaced()) return false;
-    lower_bounds = joined(lower.bounds(0), upper.bounds(0));
-    upper_bounds = joined(lower.bounds(1), upper.bounds(1));
-    exchange(lower, upper);
+  // The lower side's count is known. False, and nothing moved, where the bins counted otherwise,
+  // which only numbers that are none could do.
+  bool part(const TopRange& range, const SidePlane& plane, TopRange& lower, TopRange& upper) const {
+    LooseReference* const references = references_ + range.first;
+    Half low(references, lower.count, false);
+    Half high(references + lower.count, range.count - lower.count, true);
+    tbb::parallel_invoke([&] { low.search(loose_, plane); }, [&] { high.search(loose_, plane); });
+    if (low.misplaced() != high.misplaced()) return false;
+    for (const LooseReference& reference : range.parts) {
+      (plane.lower_side(reference) ? lower : upper).parts.push_back(reference);
+    }
+    lower.bounds = joined(joined(low.bounds(0), high.bounds(0)), bounds_of(lower.parts));
+    upper.bounds = joined(joined(low.bounds(1), high.bounds(1)), bounds_of(upper.parts));
+    exchange(low, high);
     return true;
   }
 
-  static void list(TopRange& range, std::vector<const TopRange*>& subtrees) {
-    if (range.lower != nullptr) {
-      list(*range.lower, subtrees);
-      list(*range.upper, subtrees);
-      return;
-    }
-    range.subtree = static_cast<std::uint32_t>(subtrees.size());
-    subtrees.push_back(&range);
+  static std::uint32_t total(const TopRange& range) {
+    return range.count + static_cast<std::uint32_t>(range.parts.size());
+  }
+
+  static void number(TopRange& range, std::uint32_t place) {
+    range.place = place;
+    range.size = total(range);
+    if (range.lower == nullptr) return;
+    number(*range.lower, place);
+    number(*range.upper, place + range.lower->size);
+    range.size = range.lower->size + range.upper->size;
   }
 
   const BuildInput& input_;
   const TopOptions& options_;
   LooseReference* const references_;
-  const std::uint32_t subtree_;
+  const std::uint32_t unit_;
+  float root_area_ = 0.0f;
   const LooseSplitter loose_;
   const ObjectSplitter splitter_;
-};
-
-// A range splits at one of its references, and no other range does: the pair of its children has
-// that number, and the range below has the pairs between.
-struct WholeTree {
-  const TopOptions& options;
-  const LooseReference* references;
-  BinaryTree& tree;
-  tbb::enumerable_thread_specific<SubtreeRoom> rooms;
-
-  void build(const TopRange& range, std::uint32_t root) {
-    BinaryNode* const nodes = tree.nodes.data();
-    if (range.lower == nullptr) {
-      rooms.local().build(range, options, references, nodes, range.first + 1, root);
-      return;
-    }
-    const std::uint32_t pair = range.upper->first;
-    write_node(nodes[root], range.bounds, pair, range.count);
-    tbb::parallel_invoke([&] { build(*range.lower, 2 * pair); },
-                         [&] { build(*range.upper, 2 * pair + 1); });
-  }
 };
 
 }  // namespace
@@ -216,40 +217,39 @@ TopTree split_top(const BuildInput& input, const TopOptions& options, LooseRefer
 }
 
 SubtreeRoom::SubtreeRoom()
-    : references_(std::make_unique_for_overwrite<Reference[]>(kMostInSubtree)),
-      spare_(std::make_unique_for_overwrite<Reference[]>(kMostInSubtree)) {}
+    : references_(std::make_unique_for_overwrite<Reference[]>(kMostInUnit)),
+      spare_(std::make_unique_for_overwrite<Reference[]>(kMostInUnit)) {}
 
 void SubtreeRoom::build(const TopRange& range, const TopOptions& options,
                         const LooseReference* references, BinaryNode* nodes, LocalTriangle* local) {
-  for (std::uint32_t i = 0; i < range.count; ++i) {
-    const LooseReference& from = references[range.first + i];
-    local[i] = {from.corners, from.triangle};
+  build({options, references, range.place, nodes, local}, range, BinaryTree::kRoot);
+}
+
+// A range splits at one of its references, and no other range does: the pair of its children has
+// that number, and the range below has the pairs between.
+void SubtreeRoom::build(const Work& work, const TopRange& range, std::uint32_t root) {
+  if (range.lower == nullptr) {
+    build_unit(work, range, root);
+    return;
   }
-  loose_.pack(references + range.first, range.count, references_.get());
-  for (std::uint32_t i = 0; i < range.count; ++i) references_[i].triangle = i;
-  build(range, options, nodes, 1, BinaryTree::kRoot);
+  const std::uint32_t pair = range.upper->place - work.base;
+  write_node(work.nodes[root], range.bounds, pair, range.size);
+  build(work, *range.lower, 2 * pair);
+  build(work, *range.upper, 2 * pair + 1);
 }
 
-void SubtreeRoom::build(const TopRange& range, const TopOptions& options,
-                        const LooseReference* references, BinaryNode* nodes,
-                        std::uint32_t first_pair, std::uint32_t root) {
-  loose_.pack(references + range.first, range.count, references_.get());
-  build(range, options, nodes, first_pair, root);
-}
-
-void SubtreeRoom::build(const TopRange& range, const TopOptions& options, BinaryNode* nodes,
-                        std::uint32_t first_pair, std::uint32_t root) {
-  splitter_.subtree({references_.get(), spare_.get(), range.count, range.bounds, nodes, first_pair,
-                     root, options.bins, std::max(options.sah_depth - range.depth, 0)});
-}
-
-BinaryTree build_below(const TopTree& top, const TopOptions& options,
-                       const LooseReference* references) {
-  BinaryTree tree;
-  tree.nodes.resize(2 * std::uint64_t{top.root->count});
-  WholeTree whole{options, references, tree, {}};
-  whole.build(*top.root, BinaryTree::kRoot);
-  return tree;
+void SubtreeRoom::build_unit(const Work& work, const TopRange& unit, std::uint32_t root) {
+  const std::uint32_t first = unit.place - work.base;
+  const LooseReference* const own = work.references + unit.first;
+  loose_.pack(own, unit.count, references_.get());
+  loose_.pack(unit.parts.data(), unit.size - unit.count, references_.get() + unit.count);
+  LocalTriangle* local = work.local + first;
+  const auto name = [&](const LooseReference& from) { *local++ = {from.corners, from.triangle}; };
+  std::for_each_n(own, unit.count, name);
+  std::for_each(unit.parts.begin(), unit.parts.end(), name);
+  for (std::uint32_t i = 0; i < unit.size; ++i) references_[i].triangle = first + i;
+  splitter_.subtree({references_.get(), spare_.get(), unit.size, unit.bounds, work.nodes, first + 1,
+                     root, work.options.bins, std::max(work.options.sah_depth - unit.depth, 0)});
 }
 
 }  // namespace octrace::octree

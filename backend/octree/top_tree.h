@@ -1,4 +1,5 @@
-// The top of the binary tree, down to ranges of references that one thread builds in its cache.
+// The top of the binary tree, down to units of references; and what one thread builds of it in its
+// cache.
 #pragma once
 
 #include <cstdint>
@@ -6,39 +7,44 @@
 #include <vector>
 
 #include "backend/octree/binary_tree.h"
-#include "backend/octree/loose_split.h"
+#include "backend/octree/loose_cut.h"
 
 namespace octrace::octree {
 
-// The most references of a subtree: 256 KiB of them, and twice as much of binary nodes, stay in a
-// core's caches while they are worked on.
+// The most references of a unit, which are split no further together.
+inline constexpr std::uint32_t kMostInUnit = 1024;
+// The most of a subtree, which one thread builds of several units: its binary nodes, 64 bytes a
+// reference, are to stay in a core's cache while they are worked on.
 inline constexpr std::uint32_t kMostInSubtree = 8192;
 
 struct TopOptions {
   int bins = 16;
   int sah_depth = 64;  // binary levels; below that, ranges are halved by rank
+  // Triangles are cut where the sides of a split would reach into each other by more than this part
+  // of the root's surface (ObjectSplit::overlap), and at most into this many more of them.
+  int spatial_bins = 16;
+  float least_overlap = 0.02f;
+  float duplicates = 0.1f;  // 0: no cuts
 };
 
-// References [first, first + count), which are to be leaf triangles of the same numbers.
 struct TopRange {
+  // Of a range that is not split, a unit: its references, which are [first, first + count) and,
+  // where triangles were cut, some beside the array.
   std::uint32_t first = 0, count = 0;
+  Parts parts;
   int depth = 0;
   Bounds8 bounds;
-  std::uint32_t subtree = 0;               // its number, where it is not split
+  std::uint32_t room = 0;                  // how many parts more cuts may make
+  std::uint32_t place = 0, size = 0;       // where its references are among those of all units
   std::unique_ptr<TopRange> lower, upper;  // both or none
 };
 
 struct TopTree {
   std::unique_ptr<TopRange> root;
-  std::vector<const TopRange*> subtrees;  // in order of their references
-  // How far sides of splits reach into each other: the most surface that two of them share, less
-  // the faces that any two neighbours share, as part of the root's. Large triangles among small
-  // ones make it large.
-  float overlap = 0.0f;
 };
 
-// Makes the references of all triangles and sorts them into ranges. The same for any number of
-// threads. Needs at least one triangle.
+// Makes the references of all triangles and sorts them into units; cuts triangles between units,
+// but not in them. The same for any number of threads. Needs at least one triangle.
 TopTree split_top(const BuildInput& input, const TopOptions& options, LooseReference* references);
 
 struct LocalTriangle {
@@ -51,26 +57,26 @@ class SubtreeRoom {
  public:
   SubtreeRoom();
 
-  // The binary tree over the range, whose leaves are single references: its root goes to
-  // nodes[root], and its pairs are the count - 1 from first_pair on.
-  void build(const TopRange& range, const TopOptions& options, const LooseReference* references,
-             BinaryNode* nodes, std::uint32_t first_pair, std::uint32_t root);
-  // The same tree by itself, in nodes[kRoot] and the pairs from 1 on. Its leaves name places in
-  // `local`, which is filled as well.
+  // The binary tree over the range, of at most kMostInSubtree references, in nodes[kRoot] and the
+  // pairs from 1 on. Its leaves are single references and name places in `local`, which is filled
+  // as well.
   void build(const TopRange& range, const TopOptions& options, const LooseReference* references,
              BinaryNode* nodes, LocalTriangle* local);
 
  private:
-  void build(const TopRange& range, const TopOptions& options, BinaryNode* nodes,
-             std::uint32_t first_pair, std::uint32_t root);
+  struct Work {
+    const TopOptions& options;
+    const LooseReference* references;
+    std::uint32_t base;  // the place of the range's first reference
+    BinaryNode* nodes;
+    LocalTriangle* local;
+  };
+  void build(const Work& work, const TopRange& range, std::uint32_t root);
+  void build_unit(const Work& work, const TopRange& unit, std::uint32_t root);
 
   LooseSplitter loose_;
   ObjectSplitter splitter_;
   std::unique_ptr<Reference[]> references_, spare_;
 };
-
-// The whole binary tree.
-BinaryTree build_below(const TopTree& top, const TopOptions& options,
-                       const LooseReference* references);
 
 }  // namespace octrace::octree

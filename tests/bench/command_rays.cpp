@@ -5,6 +5,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
 
@@ -19,6 +20,7 @@
 #include "tests/bench/ray_race.h"
 #include "tests/bench/ray_sets.h"
 #include "tests/bench/statistics.h"
+#include "tests/bench/views.h"
 
 namespace octrace::bench {
 
@@ -32,6 +34,7 @@ struct Options {
   std::vector<std::string> sets = {"primary", "bounce", "ao"};
   unsigned threads = 1, scaling = 0;
   int repeats = 5;
+  std::uint32_t views = 0;
   bool count = false;
 };
 
@@ -56,10 +59,15 @@ class SceneBench {
     return {};
   }
 
+  std::vector<scene::Camera> views() const {
+    return scattered_views(scene_, octree_, wide_, options_.views);
+  }
+
   bool run(const kernels::RayCamera& camera, int width, int height, nlohmann::json& rows) {
     const std::vector<kernels::Ray> primary = primary_rays(camera, width, height);
     std::vector<kernels::Hit> hits;
     trace_cpu(scene_, octree_, wide_, primary, false, true, options_.threads, &hits);
+    ++view_;
     for (const RaySet set : {RaySet::primary, RaySet::bounce, RaySet::ao}) {
       if (std::find(options_.sets.begin(), options_.sets.end(), bench::name_of(set)) ==
           options_.sets.end())
@@ -90,6 +98,7 @@ class SceneBench {
     }
     nlohmann::json row = race_row(name_, result);
     row["builder"] = options_.builder;
+    row["view"] = view_;
     if (options_.count) {
       const Work work = count_work(scene_, octree_, rays.rays, rays.any_hit);
       row["nodes_per_ray"] = work.nodes;
@@ -134,6 +143,7 @@ class SceneBench {
                     {"set", bench::name_of(rays.set)},
                     {"device", "cuda"},
                     {"builder", options_.builder},
+                    {"view", view_},
                     {"device_name", gpu_->name()},
                     {"rays", rays.rays.size()},
                     {"launches", seconds.size()},
@@ -151,6 +161,7 @@ class SceneBench {
   octree::WideOctree wide_;
   std::optional<EmbreePeer> peer_;
   std::unique_ptr<RayGpu> gpu_;
+  std::uint32_t view_ = 0;  // counted from 1
 };
 
 util::Result<octree::Octree> build(const Options& options, const scene::Scene& scene,
@@ -165,6 +176,24 @@ util::Result<octree::Octree> build(const Options& options, const scene::Scene& s
                   : options.builder == "quality" ? octree::Builder::quality
                                                  : octree::Builder::sah;
   return octree::build(scene, build);
+}
+
+// The geometric means over the views of a scene, whose rows are those from `first` on.
+void print_means(const nlohmann::json& rows, std::size_t first) {
+  std::map<std::string, std::map<std::string, double>> logarithms;
+  double views = 0.0;
+  for (std::size_t i = first; i < rows.size(); ++i) {
+    views = std::max(views, rows[i]["view"].get<double>());
+    for (const char* key : {"mrays_per_s", "ratio", "nodes_per_ray", "triangles_per_ray"}) {
+      if (!rows[i].contains(key)) continue;
+      logarithms[rows[i]["set"]][key] += std::log(rows[i][key].get<double>());
+    }
+  }
+  for (const auto& [set, sums] : logarithms) {
+    fmt::print("geometric mean of {} views {:<8}", views, set);
+    for (const auto& [key, sum] : sums) fmt::print(" {} {:.2f}", key, std::exp(sum / views));
+    fmt::print("\n");
+  }
 }
 
 int run(const Options& options) {
@@ -185,6 +214,7 @@ int run(const Options& options) {
   }
   nlohmann::json rows = nlohmann::json::array();
   for (const std::string& name : options.scenes) {
+    const std::size_t first = rows.size();
     util::Result<scene::Scene> scene = load_scene(name);
     if (!scene) return fail(scene.error());
     util::Result<scene::Camera> camera =
@@ -199,7 +229,12 @@ int run(const Options& options) {
         return fail(ready.error());
       }
     }
-    if (!bench.run(scene::make_ray_camera(*camera, width, height), width, height, rows)) return 1;
+    const std::vector<scene::Camera> cameras =
+        options.views == 0 ? std::vector<scene::Camera>{*camera} : bench.views();
+    for (const scene::Camera& view : cameras) {
+      if (!bench.run(scene::make_ray_camera(view, width, height), width, height, rows)) return 1;
+    }
+    if (options.views > 1) print_means(rows, first);
   }
   return write_json(options.json, rows);
 }
@@ -240,6 +275,10 @@ void add_rays_command(CLI::App& app, int& exit_code) {
                      "Trace the same rays with this library on the CPU, turn about")
         ->check(CLI::IsMember({"embree"}));
   }
+  command
+      ->add_option("--views", options->views,
+                   "Instead of one camera, so many from all over the scene, and their means")
+      ->check(CLI::Range(0u, 1000u));
   command->add_flag("--count", options->count, "Count nodes and triangles tested a ray");
   command->add_option("--json", options->json, "Write the rows to this file");
   command->callback([options, &exit_code] { exit_code = run(*options); });

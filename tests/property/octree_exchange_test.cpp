@@ -54,8 +54,9 @@ struct Split {
     octree::Half lower(references.data(), lower_count, false);
     octree::Half upper(references.data() + lower_count, count - lower_count, true);
     tbb::task_arena(1).execute([&] {
-      lower.search(splitter, binning, split);
-      upper.search(splitter, binning, split);
+      const octree::SidePlane plane(binning, split);
+      lower.search(splitter, plane);
+      upper.search(splitter, plane);
     });
     ASSERT_EQ(lower.misplaced(), upper.misplaced());
     std::atomic<std::uint32_t> next{0};

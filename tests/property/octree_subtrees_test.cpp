@@ -1,6 +1,6 @@
-// Scenes of several subtrees (backend/octree/top_tree.h): the ranges that threads take, and the
-// octrees made of them by either way, whole or in parts. The other tests' meshes are smaller than
-// one subtree.
+// Scenes of several subtrees (backend/octree/top_tree.h): the units that the top is split into,
+// with and without cuts, and the octrees made of them. The other tests' meshes are smaller than one
+// subtree.
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 #include <tbb/task_arena.h>
@@ -26,8 +26,6 @@ namespace {
 using kernels::Vec3;
 
 constexpr unsigned kThreads[] = {1, 2, 3, 8};
-// Triangles from which subtrees are built one by one: always; never.
-constexpr std::uint32_t kWays[] = {0, std::numeric_limits<std::uint32_t>::max()};
 
 using Corner = std::function<Vec3(std::uint32_t triangle, int corner, std::mt19937_64&)>;
 
@@ -59,12 +57,12 @@ struct LargeMesh {
   std::function<Mesh()> make;
 };
 
-// From 5462 triangles on a scene has more than one range, of up to 8192 references; at 43696 the
-// ranges become smaller (subtree_size() in top_tree.cpp).
+// From 65 triangles on a scene has more than one unit, from 8193 on more than one subtree; from
+// 65536 on its units have 1024 references (unit_size() in top_tree.cpp).
 std::vector<LargeMesh> large_meshes() {
   std::vector<LargeMesh> meshes;
   for (const std::uint32_t count :
-       {5460u, 5461u, 5462u, 8191u, 8192u, 8193u, 43690u, 43695u, 43696u, 100000u}) {
+       {64u, 65u, 4096u, 8191u, 8192u, 8193u, 65535u, 65536u, 100000u}) {
     meshes.push_back({"dust_" + std::to_string(count), [count] { return make_dust(count); }});
   }
   const auto add = [&](const char* name, std::uint32_t count, const Corner& corner) {
@@ -86,6 +84,20 @@ std::vector<LargeMesh> large_meshes() {
   });
   meshes.push_back({"denormals", [] { return make_dust(20000, 1e-42f); }});
   meshes.push_back({"far", [] { return make_dust(20000, 9e8f); }});
+  // A floor, a wall and a beam among dust: large triangles that are cut.
+  add("room", 30000, [](std::uint32_t i, int c, std::mt19937_64& r) {
+    static Vec3 centre;
+    if (i < 300) {
+      const float at = static_cast<float>(i / 6) / 50.0f;
+      const bool far = (i + static_cast<std::uint32_t>(c)) % 2 != 0;
+      if (i % 3 == 0) return Vec3(c == 0 ? 0.0f : 1.0f, at, far ? 1.0f : 0.0f);
+      if (i % 3 == 1) return Vec3(at, c == 1 ? 0.0f : 1.0f, far ? 1.0f : 0.0f);
+      return Vec3(c == 2 ? 1.0f : 0.0f, far ? 1.0f : 0.0f, c == 1 ? 1.0f : at);
+    }
+    const Vec3 v(uniform(r), uniform(r), uniform(r));
+    if (c == 0) centre = v;
+    return centre + 0.01f * v;
+  });
   // Ever smaller triangles about one corner: the deepest trees, from which halving by rank saves.
   add("chain", 20000, [](std::uint32_t i, int c, std::mt19937_64&) {
     const float s = std::exp2(-0.007f * static_cast<float>(i));
@@ -99,12 +111,12 @@ bool same_bytes(const std::vector<T, Allocator>& a, const std::vector<T, Allocat
   return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(T)) == 0;
 }
 
-octree::Octree build(const Mesh& mesh, std::uint32_t least_for_subtrees, unsigned threads = 1,
+octree::Octree build(const Mesh& mesh, bool cuts, unsigned threads = 1,
                      std::uint32_t leaf = kernels::kMaxLeafTriangles) {
   const octree::BuildInput input = mesh.input();
   octree::Octree octree;
   tbb::task_arena(static_cast<int>(threads)).execute([&] {
-    octree::build_sah(input, leaf, false, octree, least_for_subtrees);
+    octree::build_sah(input, {leaf, false, cuts}, octree);
   });
   return octree;
 }
@@ -115,38 +127,89 @@ struct OctreeSubtrees : testing::TestWithParam<std::size_t> {
   Mesh mesh = large_meshes()[GetParam()].make();
 };
 
-TEST_P(OctreeSubtrees, RangesHoldAllReferences) {
+struct Units {
+  std::vector<octree::LooseReference> references;
+  octree::TopTree top;
+  std::vector<const octree::TopRange*> units;
+
+  Units(const octree::BuildInput& input, const octree::TopOptions& options, unsigned threads)
+      : references(input.triangles.size()) {
+    tbb::task_arena(static_cast<int>(threads)).execute([&] {
+      top = octree::split_top(input, options, references.data());
+    });
+    list(*top.root);
+  }
+
+  std::vector<octree::LooseReference> of(const octree::TopRange& unit) const {
+    std::vector<octree::LooseReference> all(references.begin() + unit.first,
+                                            references.begin() + unit.first + unit.count);
+    all.insert(all.end(), unit.parts.begin(), unit.parts.end());
+    return all;
+  }
+
+ private:
+  void list(const octree::TopRange& range) {
+    if (range.lower == nullptr) {
+      units.push_back(&range);
+      return;
+    }
+    list(*range.lower);
+    list(*range.upper);
+  }
+};
+
+octree::Box box_of(const octree::LooseReference& reference) {
+  octree::Box box;
+  box.add(octree::Float4{reference.lower[0], reference.lower[1], reference.lower[2], 0.0f});
+  box.add(octree::Float4{-reference.negated_upper[0], -reference.negated_upper[1],
+                         -reference.negated_upper[2], 0.0f});
+  return box;
+}
+
+bool same(const octree::Box& a, const octree::Box& b) {
+  for (int axis = 0; axis < 3; ++axis) {
+    if (a.lower[axis] != b.lower[axis] || a.upper[axis] != b.upper[axis]) return false;
+  }
+  return true;
+}
+
+bool contains(const octree::Box& box, const Vec3& point) {
+  for (int axis = 0; axis < 3; ++axis) {
+    if (!(point[axis] >= box.lower[axis] && point[axis] <= box.upper[axis])) return false;
+  }
+  return true;
+}
+
+TEST_P(OctreeSubtrees, UnitsHoldAllReferences) {
   const octree::BuildInput input = mesh.input();
   const std::size_t count = input.triangles.size();
   for (const int sah_depth : {64, 3, 0}) {
     octree::TopOptions options;
     options.sah_depth = sah_depth;
+    options.duplicates = 0.0f;
     std::vector<std::uint32_t> expected;
     for (const unsigned threads : kThreads) {
-      std::vector<octree::LooseReference> references(count);
-      octree::TopTree top;
-      tbb::task_arena(static_cast<int>(threads)).execute([&] {
-        top = octree::split_top(input, options, references.data());
-      });
-      EXPECT_EQ(top.subtrees.size() > 1, count > 5461);
+      const Units units(input, options, threads);
+      EXPECT_EQ(units.units.size() > 1, count > 64);
       std::uint32_t next = 0;
       std::vector<std::uint32_t> triangles;
-      for (const octree::TopRange* range : top.subtrees) {
-        ASSERT_EQ(range->first, next);
-        ASSERT_GT(range->count, 0u);
-        ASSERT_LE(range->count, octree::kMostInSubtree);
-        next += range->count;
+      for (const octree::TopRange* unit : units.units) {
+        ASSERT_EQ(unit->first, next);
+        ASSERT_EQ(unit->place, next);
+        ASSERT_GT(unit->count, 0u);
+        ASSERT_EQ(unit->count, unit->size);
+        ASSERT_LE(unit->count, octree::kMostInUnit);
+        next += unit->count;
         octree::Box bounds;
-        for (std::uint32_t i = range->first; i < next; ++i) {
-          const octree::LooseReference& reference = references[i];
+        for (const octree::LooseReference& reference : units.of(*unit)) {
           triangles.push_back(reference.triangle);
           ASSERT_LT(reference.triangle, count);
           ASSERT_EQ(reference.corners.a, input.triangles[reference.triangle].a);
           bounds.add(octree::triangle_box(input, reference.triangle));
         }
         for (int axis = 0; axis < 3; ++axis) {
-          EXPECT_EQ(range->bounds.lower(axis), bounds.lower[axis]);
-          EXPECT_EQ(range->bounds.upper(axis), bounds.upper[axis]);
+          EXPECT_EQ(unit->bounds.lower(axis), bounds.lower[axis]);
+          EXPECT_EQ(unit->bounds.upper(axis), bounds.upper[axis]);
         }
       }
       EXPECT_EQ(next, count);
@@ -158,13 +221,76 @@ TEST_P(OctreeSubtrees, RangesHoldAllReferences) {
   }
 }
 
+// Every point of a triangle lies in the box of one of its parts.
+TEST_P(OctreeSubtrees, PartsCoverTheirTriangles) {
+  const octree::BuildInput input = mesh.input();
+  const auto count = static_cast<std::uint32_t>(input.triangles.size());
+  octree::TopOptions options;
+  options.least_overlap = 0.0f;
+  std::vector<octree::LooseReference> expected;
+  for (const unsigned threads : kThreads) {
+    const Units units(input, options, threads);
+    std::vector<std::vector<octree::Box>> boxes(count);
+    std::vector<octree::LooseReference> all;
+    for (const octree::TopRange* unit : units.units) {
+      ASSERT_EQ(unit->place, all.size());
+      ASSERT_LE(unit->size, octree::kMostInUnit);
+      octree::Box bounds;
+      for (const octree::LooseReference& reference : units.of(*unit)) {
+        ASSERT_LT(reference.triangle, count);
+        boxes[reference.triangle].push_back(box_of(reference));
+        bounds.add(boxes[reference.triangle].back());
+        all.push_back(reference);
+      }
+      ASSERT_EQ(unit->size, all.size() - unit->place);
+      for (int axis = 0; axis < 3; ++axis) {
+        EXPECT_EQ(unit->bounds.lower(axis), bounds.lower[axis]);
+        EXPECT_EQ(unit->bounds.upper(axis), bounds.upper[axis]);
+      }
+    }
+    EXPECT_LE(all.size(), count * (1.0 + options.duplicates));
+    if (mesh.name == "room") {
+      EXPECT_GT(all.size(), count + 300u);
+    }
+    for (octree::LooseReference& reference : all) reference.note = 0;  // of whoever split last
+    if (threads > 1) {
+      ASSERT_TRUE(same_bytes(all, expected)) << threads << " threads";
+      continue;
+    }
+    expected = all;
+    std::mt19937_64 random(seed());
+    for (std::uint32_t i = 0; i < count; ++i) {
+      ASSERT_FALSE(boxes[i].empty());
+      if (boxes[i].size() == 1) {
+        ASSERT_TRUE(same(boxes[i][0], octree::triangle_box(input, i)));
+        continue;
+      }
+      const kernels::Triangle& t = input.triangles[i];
+      for (int k = 0; k < 20; ++k) {
+        float u = uniform(random), v = uniform(random);
+        if (u + v > 1.0f) u = 1.0f - u, v = 1.0f - v;
+        const Vec3 &a = input.positions[t.a], &b = input.positions[t.b], &c = input.positions[t.c];
+        const Vec3 point = a + u * (b - a) + v * (c - a);
+        EXPECT_TRUE(std::any_of(boxes[i].begin(), boxes[i].end(),
+                                [&](const octree::Box& box) { return contains(box, point); }))
+            << "triangle " << i;
+      }
+    }
+  }
+}
+
 TEST_P(OctreeSubtrees, AreSoundAndTheSameForAnyThreadCount) {
-  for (const std::uint32_t way : kWays) {
+  for (const bool cuts : {false, true}) {
     for (const std::uint32_t leaf : {std::uint32_t{kernels::kMaxLeafTriangles}, 1u}) {
       octree::Octree expected;
       for (const unsigned threads : kThreads) {
-        octree::Octree octree = build(mesh, way, threads, leaf);
-        EXPECT_EQ(octree.triangles.size(), mesh.triangles.size());
+        octree::Octree octree = build(mesh, cuts, threads, leaf);
+        if (!cuts) {
+          EXPECT_EQ(octree.triangles.size(), mesh.triangles.size());
+        }
+        if (mesh.name == "room") {
+          EXPECT_EQ(octree.cut, cuts);
+        }
         if (threads == 1) {
           const util::Result<void> ok = octree::verify(octree, mesh.input());
           ASSERT_TRUE(ok) << mesh.name << ": " << ok.error().to_string();
@@ -179,7 +305,7 @@ TEST_P(OctreeSubtrees, AreSoundAndTheSameForAnyThreadCount) {
 }
 
 TEST_P(OctreeSubtrees, HitWhatBruteForceHits) {
-  const octree::Octree octrees[] = {build(mesh, kWays[0]), build(mesh, kWays[1])};
+  const octree::Octree octrees[] = {build(mesh, false), build(mesh, true)};
   const kernels::CpuTracer tracer;
   std::mt19937_64 random(seed());
   for (std::uint64_t i = 0; i < scaled(500); ++i) {
@@ -199,35 +325,39 @@ TEST_P(OctreeSubtrees, HitWhatBruteForceHits) {
   }
 }
 
-TEST(OctreeOfDust, IsBuiltInPartsWhereItIsLarge) {
-  for (const std::uint32_t count : {octree::kLeastForSubtrees - 1, octree::kLeastForSubtrees}) {
-    const Mesh mesh = make_dust(count);
-    const util::Result<octree::Octree> octree = octree::build(mesh.input(), {});
-    ASSERT_TRUE(octree);
-    const bool large = count == octree::kLeastForSubtrees;
-    EXPECT_TRUE(same_bytes(octree->nodes, build(mesh, kWays[large ? 0 : 1]).nodes));
-    EXPECT_FALSE(same_bytes(octree->nodes, build(mesh, kWays[large ? 1 : 0]).nodes));
+// A ray is dimmed once by a BLEND triangle, so it must lie in one leaf.
+TEST(OctreeOfBlendedTriangles, HasNoCuts) {
+  Mesh mesh;
+  for (const LargeMesh& large : large_meshes()) {
+    if (large.name == "room") mesh = large.make();
   }
+  const std::vector<std::uint32_t> geometry(mesh.triangles.size(), 0);
+  const std::uint32_t flags[] = {kernels::kBlend};
+  octree::BuildInput input = mesh.input();
+  input.triangle_geometry = geometry;
+  input.flags = flags;
+  octree::Octree octree;
+  octree::build_sah(input, {}, octree);
+  EXPECT_EQ(octree.triangles.size(), mesh.triangles.size());
+  EXPECT_FALSE(octree.cut);
+  EXPECT_TRUE(octree::verify(octree, input));
 }
 
 // Ever smaller triangles in a row, down to surfaces that vanish, of which an eight-way node takes
-// no more than two. Down to 2^-70 the way in parts is too deep and the whole tree is not; down to
-// 2^-71 both are, and halves by rank are left.
-TEST(OctreeOfAChain, FallsBackToTheWholeTreeAndThenToHalvesByRank) {
+// no more than two: too deep, so that halves by rank are left, which end in leaves at the eleventh
+// level.
+TEST(OctreeOfAChain, FallsBackToHalvesByRank) {
   constexpr std::uint32_t kCount = 6000;
-  for (const int least : {-70, -71}) {
+  for (const int least : {-20, -71}) {
     const Mesh mesh = make("chain", kCount, [&](std::uint32_t i, int c, std::mt19937_64&) {
       const double steps = 62.0 - least;
       const auto s = static_cast<float>(std::exp2(61.8 - steps * i / kCount));
       return Vec3(c == 1 ? 1.001f * s : s, c == 2 ? 0.001f * s : 0.0f, c == 1 ? 0.001f * s : 0.0f);
     });
-    const octree::Octree parts = build(mesh, kWays[0]), whole = build(mesh, kWays[1]);
-    const util::Result<void> ok = octree::verify(parts, mesh.input());
+    const octree::Octree octree = build(mesh, true);
+    const util::Result<void> ok = octree::verify(octree, mesh.input());
     EXPECT_TRUE(ok) << ok.error().to_string();
-    EXPECT_TRUE(same_bytes(parts.nodes, whole.nodes));
-    EXPECT_TRUE(same_bytes(parts.triangles, whole.triangles));
-    // Halves of 6000 by rank end in leaves at the eleventh level.
-    EXPECT_EQ(octree::statistics(parts).depth, least == -70 ? 10u : 11u);
+    EXPECT_EQ(octree::statistics(octree).depth, least == -71 ? 11u : 9u);
   }
 }
 
@@ -236,8 +366,8 @@ TEST(OctreeOfHugeTriangles, IsSound) {
   for (const float scale : {1e18f, 1e19f, 1e38f}) {
     for (const std::uint32_t count : {5u, 30u, 20000u}) {
       const Mesh mesh = make_dust(count, scale);
-      for (const std::uint32_t way : kWays) {
-        const util::Result<void> ok = octree::verify(build(mesh, way), mesh.input());
+      for (const bool cuts : {false, true}) {
+        const util::Result<void> ok = octree::verify(build(mesh, cuts), mesh.input());
         EXPECT_TRUE(ok) << scale << ", " << count << ": " << ok.error().to_string();
       }
       for (const octree::Builder builder : {octree::Builder::sah, octree::Builder::quality}) {
