@@ -130,7 +130,8 @@ class BinaryBuilder {
       return chosen;
     }
     const SpatialBinning space(bounds, options_.spatial_bins);
-    const SpatialSplit spatial = best(spatial_bins(references, range.count, space), space);
+    const SpatialSplit spatial =
+        best(spatial_bins(references, range.count, space), space, range.room);
     chosen.misses = spatial.cost < chosen.object.cost ? 0 : misses + 1;
     if (chosen.misses == 0) chosen.spatial = spatial;
     return chosen;

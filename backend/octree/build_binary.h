@@ -9,7 +9,8 @@ struct BinaryOptions {
   int bins = 16;
   int sah_depth = 64;  // binary levels; below that, ranges are halved by rank
   // Spatial splits: at most this share of the triangles more references, where the sides of the
-  // best object split share more than this part of the root's surface. 0: none.
+  // best object split reach into each other by more than this part of the root's surface
+  // (ObjectSplit::overlap). 0: none.
   int spatial_bins = 8;
   float duplicates = 0.0f;
   float least_overlap = 1e-3f;

@@ -1,6 +1,7 @@
 // The SAH builders. `sah`: the top of a binary tree with cuts (top_tree.h), subtrees in cache below
 // (build_subtrees.h). `quality`: a whole binary tree with more cuts (build_binary.h), improved by
 // re-insertion (reinsert.h), collapsed into eight-way nodes (collapse.h).
+#include <algorithm>
 #include <stdexcept>
 
 #include "backend/octree/build_binary.h"
@@ -87,10 +88,16 @@ void build_sah(const BuildInput& input, const SahOptions& options, Octree& octre
 std::uint64_t sah_build_bytes(std::uint64_t triangles, const SahOptions& options) {
   const auto count = static_cast<double>(triangles);
   if (!options.quality) {
-    // Nodes, of which there is one for six triangles or more, are held twice for a moment.
-    constexpr double kNodes = 2 * sizeof(kernels::Node) / 6.0;
-    const double references = count * (1.0 + double{fast_options(options.cuts).duplicates});
-    return static_cast<std::uint64_t>(references * (sizeof(LooseReference) + kNodes));
+    // Measured: at most so many nodes a reference, which are held twice for a moment.
+    constexpr double kNodes[] = {0.36, 0.28, 0.22};  // of one, two and three triangles a leaf
+    const double nodes = kNodes[std::clamp(options.leaf_triangles, 1u, 3u) - 1];
+    // Parts of triangles are listed, in vectors that may have twice the room, and their leaf
+    // triangles wait for their places.
+    constexpr double kPart = 2 * sizeof(LooseReference) + sizeof(kernels::LeafTriangle);
+    const double parts = count * double{fast_options(options.cuts).duplicates};
+    return static_cast<std::uint64_t>(
+        (count + parts) * (sizeof(LooseReference) + 2 * nodes * sizeof(kernels::Node)) +
+        parts * kPart);
   }
   constexpr double kReferences = 2 * sizeof(Reference), kTree = 2 * sizeof(BinaryNode);
   const double references =

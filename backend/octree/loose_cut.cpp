@@ -52,7 +52,8 @@ Block cut_block(const BuildInput& input, const LooseReference* references, std::
 }  // namespace
 
 SpatialSplit best_cut(const BuildInput& input, const LooseSplitter& splitter,
-                      const LooseRange& range, const Bounds8& bounds, int bin_count) {
+                      const LooseRange& range, const Bounds8& bounds, std::uint32_t room,
+                      int bin_count) {
   const SpatialBinning binning(bounds, bin_count);
   SpatialBins bins = tbb::parallel_reduce(
       tbb::blocked_range<std::uint32_t>(0, range.count, kParallel), SpatialBins(),
@@ -67,7 +68,7 @@ SpatialSplit best_cut(const BuildInput& input, const LooseSplitter& splitter,
       });
   splitter.fill_space(input, range.parts.data(), static_cast<std::uint32_t>(range.parts.size()),
                       binning, bins);
-  return best(bins, binning);
+  return best(bins, binning, room);
 }
 
 std::uint32_t cut_at(const BuildInput& input, const LooseRange& range, std::uint32_t room,

@@ -20,9 +20,9 @@ struct LooseRange {
   std::uint32_t total() const { return count + static_cast<std::uint32_t>(parts.size()); }
 };
 
-// The cheapest plane to cut at, none where axis is -1.
+// The cheapest plane to cut at that makes at most `room` parts; none where axis is -1.
 SpatialSplit best_cut(const BuildInput& input, const LooseSplitter& splitter,
-                      const LooseRange& range, const Bounds8& bounds, int bins);
+                      const LooseRange& range, const Bounds8& bounds, std::uint32_t room, int bins);
 
 // Cuts what lies on both sides of the plane. Returns how many references of the array then belong
 // to the lower side, by SidePlane(axis, plane). kNone, and nothing cut: more than `room` parts

@@ -61,11 +61,12 @@ HWY_ATTR HWY_INLINE void join(const Box8& box, Bounds8& bin) {
 // A box that lies in several bins along an axis.
 HWY_ATTR HWY_NOINLINE void fill_across(const BuildInput& input, const LooseReference& reference,
                                        const std::int32_t* first, const std::int32_t* last,
-                                       const Clips& clips, SpatialBins& bins) {
+                                       const SpatialBinning& binning, const Clips& clips,
+                                       SpatialBins& bins) {
   const bool cuts = may_cut(input, reference.corners.geometry);
   for (int axis = 0; axis < 3; ++axis) {
-    std::int32_t bin = first[axis];
-    const std::int32_t end = cuts ? last[axis] : bin;
+    std::int32_t bin = first[axis], end = last[axis];
+    if (!cuts) bin = end = binning.bin(0.5f * reference.centre2(axis), axis);
     ++bins.enter[axis][bin];
     ++bins.leave[axis][end];
     Box8 rest = load(reference);
@@ -111,7 +112,7 @@ HWY_ATTR void fill_space(const BuildInput& input, const LooseReference* referenc
     for (std::uint32_t i = 0; i < few; ++i) {
       const std::int32_t *begin = first[i], *end = last[i];
       if (((begin[0] ^ end[0]) | (begin[1] ^ end[1]) | (begin[2] ^ end[2])) != 0) {
-        fill_across(input, from[i], begin, end, clips, bins);
+        fill_across(input, from[i], begin, end, binning, clips, bins);
         continue;
       }
       const Box8 box = load(from[i]);

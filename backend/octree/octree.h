@@ -22,8 +22,8 @@ struct BuildOptions {
   std::uint32_t leaf = 0;  // median: most vertices in a leaf (0: 8); else: most triangles (0: 3)
   unsigned threads = 0;    // 0: all
   std::uint64_t max_bytes = 64ull << 30;  // --max-scene-bytes
-  // Triangles may be cut, so that they lie in several leaves. Not of use in a tree that is to be
-  // refitted: there every leaf holds the whole of its triangles.
+  // Triangles may be cut, so that they lie in several leaves. Of no use in a tree that is to be
+  // refitted (update.h): there every leaf's box holds the whole of its triangles.
   bool cuts = true;
 };
 

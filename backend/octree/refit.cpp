@@ -151,9 +151,7 @@ util::Result<void> update(const scene::Scene& scene, const BuildOptions& build_o
   if (upkeep.cost <= options.max_cost_growth * upkeep.built_cost) {
     return update_instance_levels(scene, build_options, octree.instances);
   }
-  BuildOptions again = build_options;
-  again.cuts = false;
-  util::Result<Octree> built = build(scene, again);
+  util::Result<Octree> built = build(scene, build_options);
   if (!built) return built.error();
   octree = std::move(*built);
   upkeep.cost = upkeep.built_cost = statistics(octree).sah_cost;

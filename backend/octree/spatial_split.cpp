@@ -188,11 +188,15 @@ void fill(const BuildInput& input, const Reference* references, std::uint32_t co
   }
 }
 
-SpatialSplit best(const SpatialBins& bins, const SpatialBinning& binning) {
+SpatialSplit best(const SpatialBins& bins, const SpatialBinning& binning, std::uint32_t most_cuts) {
   SpatialSplit split;
   for (int axis = 0; axis < 3; ++axis) {
     if (!(binning.extent[axis] > 0.0f)) continue;
     float upper_cost[kMaxBins];
+    std::uint32_t inside[kMaxBins] = {};  // references in both the bin below and this one
+    for (int bin = 1; bin < binning.bins; ++bin) {
+      inside[bin] = inside[bin - 1] + bins.enter[axis][bin - 1] - bins.leave[axis][bin - 1];
+    }
     Bounds8 box;
     std::uint32_t references = 0;
     const auto join = [&box](const Bounds8& part) {
@@ -208,7 +212,7 @@ SpatialSplit best(const SpatialBins& bins, const SpatialBinning& binning) {
     for (int bin = 1; bin < binning.bins; ++bin) {
       join(bins.parts[axis][bin - 1]);
       references += bins.enter[axis][bin - 1];
-      if (references == 0 || upper_cost[bin] < 0.0f) continue;
+      if (references == 0 || upper_cost[bin] < 0.0f || inside[bin] > most_cuts) continue;
       const float cost = box.half_area() * static_cast<float>(references) + upper_cost[bin];
       if (cost < split.cost) split = {cost, axis, binning.plane(axis, bin)};
     }

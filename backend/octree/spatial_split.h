@@ -59,6 +59,7 @@ bool cut(const BuildInput& input, const LooseReference& reference, int axis, flo
 // Adds references to the bins, cut at all planes.
 void fill(const BuildInput& input, const Reference* references, std::uint32_t count,
           const SpatialBinning& binning, SpatialBins& bins);
-SpatialSplit best(const SpatialBins& bins, const SpatialBinning& binning);
+// Of the planes that cut at most so many references.
+SpatialSplit best(const SpatialBins& bins, const SpatialBinning& binning, std::uint32_t most_cuts);
 
 }  // namespace octrace::octree

@@ -103,9 +103,12 @@ class TopSplitter {
       const Binning binning(range.bounds, options_.bins);
       const ObjectBins bins = fill(range, binning);
       const ObjectSplit chosen = splitter_.best(bins, binning.bins);
-      if (range.room != 0 && chosen.overlap > options_.least_overlap * root_area_ &&
-          divide_space(range, chosen.cost, lower, upper)) {
-        return;
+      lower.misses = upper.misses = range.misses;
+      if (range.room != 0 && range.misses < options_.spatial_misses &&
+          chosen.overlap > options_.least_overlap * root_area_) {
+        const bool cut = divide_space(range, chosen.cost, lower, upper);
+        lower.misses = upper.misses = cut ? 0 : range.misses + 1;
+        if (cut) return;
       }
       if (chosen.axis >= 0) {
         const SidePlane plane(binning, chosen);
@@ -121,14 +124,17 @@ class TopSplitter {
   bool divide_space(TopRange& range, float cost, TopRange& lower, TopRange& upper) const {
     const LooseRange loose{references_ + range.first, range.count, range.parts};
     const SpatialSplit chosen =
-        best_cut(input_, loose_, loose, range.bounds, options_.spatial_bins);
+        best_cut(input_, loose_, loose, range.bounds, range.room, options_.spatial_bins);
     if (!(chosen.cost < cost)) return false;
     const std::size_t before = range.parts.size();
     const std::uint32_t below = cut_at(input_, loose, range.room, chosen);
     if (below == kernels::kNone) return false;
     range.room -= static_cast<std::uint32_t>(range.parts.size() - before);
     lower.count = below;
-    return part(range, SidePlane(chosen.axis, chosen.plane), lower, upper);
+    if (!part(range, SidePlane(chosen.axis, chosen.plane), lower, upper)) {
+      divide_by_rank(range, lower, upper);
+    }
+    return true;
   }
 
   void divide_by_rank(TopRange& range, TopRange& lower, TopRange& upper) const {

@@ -21,20 +21,23 @@ struct TopOptions {
   int bins = 16;
   int sah_depth = 64;  // binary levels; below that, ranges are halved by rank
   // Triangles are cut where the sides of a split would reach into each other by more than this part
-  // of the root's surface (ObjectSplit::overlap), and at most into this many more of them.
+  // of the root's surface (ObjectSplit::overlap); the parts are at most this share of the triangles
+  // more, and cuts are no longer tried below so many nodes in line that had no use for one.
   int spatial_bins = 16;
   float least_overlap = 0.02f;
   float duplicates = 0.1f;  // 0: no cuts
+  int spatial_misses = 3;
 };
 
 struct TopRange {
-  // Of a range that is not split, a unit: its references, which are [first, first + count) and,
-  // where triangles were cut, some beside the array.
+  // Its references in the array are [first, first + count). Where triangles were cut, there are
+  // more beside it, which go on to the halves of a range that is split; one that is not is a unit.
   std::uint32_t first = 0, count = 0;
   Parts parts;
   int depth = 0;
   Bounds8 bounds;
   std::uint32_t room = 0;                  // how many parts more cuts may make
+  int misses = 0;                          // nodes in line above where a cut was of no use
   std::uint32_t place = 0, size = 0;       // where its references are among those of all units
   std::unique_ptr<TopRange> lower, upper;  // both or none
 };

@@ -25,7 +25,7 @@ struct Upkeep {
 double refit(const BuildInput& input, Octree& octree);
 double refit(const scene::Scene& scene, Octree& octree);
 
-// refit(), or build() without cuts where its cost has grown too much. Errors: build()'s.
+// refit(), or build() where its cost has grown too much. Errors: build()'s.
 util::Result<void> update(const scene::Scene& scene, const BuildOptions& build,
                           const UpdateOptions& options, Octree& octree, Upkeep& upkeep);
 

@@ -146,33 +146,5 @@ TEST(OctreeUpdate, RefitsWhatBendsAndRebuildsWhatIsScattered) {
   EXPECT_TRUE(octree::verify(*octree, rest));
 }
 
-// Leaves of a refitted tree hold the whole of their triangles, so that cuts are of no more use.
-TEST(OctreeUpdate, RebuildsWithoutCuts) {
-  std::mt19937_64 random(seed());
-  Mesh mesh = make_grid(64, 0.3f, 2.0f);
-  const auto first = static_cast<std::uint32_t>(mesh.positions.size());
-  for (const float x : {-2.0f, 2.0f}) {  // walls across the grid
-    for (const float y : {-2.0f, 2.0f}) {
-      for (const float z : {-2.0f, 2.0f}) mesh.positions.emplace_back(x, y, z);
-    }
-  }
-  for (const kernels::Triangle& t : {kernels::Triangle{0, 3, 7}, {0, 7, 4}, {1, 2, 6}, {1, 6, 5}}) {
-    mesh.triangles.push_back({first + t.a, first + t.b, first + t.c});
-  }
-  const scene::Scene rest = scene_of(mesh), shifted = scene_of(moved(mesh, Motion::shift, random));
-  for (const Builder builder : {Builder::sah, Builder::quality}) {
-    octree::BuildOptions options;
-    options.builder = builder;
-    util::Result<Octree> octree = octree::build(rest, options);
-    ASSERT_TRUE(octree);
-    EXPECT_GT(octree->triangles.size(), mesh.triangles.size());
-    octree::Upkeep upkeep;
-    ASSERT_TRUE(octree::update(shifted, options, {1.0}, *octree, upkeep));
-    EXPECT_TRUE(upkeep.rebuilt);
-    EXPECT_EQ(octree->triangles.size(), mesh.triangles.size());
-    EXPECT_TRUE(octree::verify(*octree, shifted));
-  }
-}
-
 }  // namespace
 }  // namespace octrace::tests
