@@ -32,9 +32,10 @@ struct Chunk {
 
 class Workplace {
  public:
-  Workplace()
-      : nodes_(std::make_unique_for_overwrite<BinaryNode[]>(2 * kMostInSubtree)),
-        local_(std::make_unique_for_overwrite<LocalTriangle[]>(kMostInSubtree)) {}
+  explicit Workplace(std::uint32_t most)
+      : most_(most),
+        nodes_(std::make_unique_for_overwrite<BinaryNode[]>(2 * std::size_t{most})),
+        local_(std::make_unique_for_overwrite<LocalTriangle[]>(most)) {}
 
   // Returns the subtree's cost in one slot.
   float build(const TopRange& range, const TopOptions& options, std::uint32_t leaf_triangles,
@@ -64,11 +65,12 @@ class Workplace {
  private:
   kernels::LeafTriangle* more_triangles() {
     if (!triangles_) {
-      triangles_ = std::make_unique_for_overwrite<kernels::LeafTriangle[]>(kMostInSubtree);
+      triangles_ = std::make_unique_for_overwrite<kernels::LeafTriangle[]>(most_);
     }
     return triangles_.get();
   }
 
+  const std::uint32_t most_;
   SubtreeRoom room_;
   std::unique_ptr<BinaryNode[]> nodes_;
   std::unique_ptr<LocalTriangle[]> local_;
@@ -208,21 +210,21 @@ class TopWriter {
 // Adds the topmost ranges that are small enough for a subtree, and are likely to be eight-way nodes
 // in the cheapest tree; and units that are not, for want of a better one.
 void add_subtrees(const TopNodes& top, const BinaryNode* nodes, std::uint32_t root,
-                  std::unordered_set<const TopRange*>& subtrees) {
+                  std::uint32_t most, std::unordered_set<const TopRange*>& subtrees) {
   const TopRange& range = top.range(root);
-  if (range.size <= kMostInSubtree) {
+  if (range.size <= most) {
     subtrees.insert(&range);
     return;
   }
   const Family family(nodes, root);
-  for (int i = 0; i < family.count; ++i) add_subtrees(top, nodes, family.index[i], subtrees);
+  for (int i = 0; i < family.count; ++i) add_subtrees(top, nodes, family.index[i], most, subtrees);
 }
 
-TopNodes choose_subtrees(const TopTree& top) {
+TopNodes choose_subtrees(const TopTree& top, std::uint32_t most) {
   TopNodes units(top, [](const TopRange&) { return false; });
   guess_top(units.nodes());
   std::unordered_set<const TopRange*> subtrees;
-  add_subtrees(units, units.nodes(), BinaryTree::kRoot, subtrees);
+  add_subtrees(units, units.nodes(), BinaryTree::kRoot, most, subtrees);
   return TopNodes(top, [&](const TopRange& range) { return subtrees.contains(&range); });
 }
 
@@ -230,10 +232,12 @@ TopNodes choose_subtrees(const TopTree& top) {
 
 bool build_subtrees(const TopTree& top, const TopOptions& options, std::uint32_t leaf_triangles,
                     const BuildInput& input, const LooseReference* references, Octree& octree) {
-  TopNodes nodes = choose_subtrees(top);
+  // Enough subtrees for many threads, which need room for one each.
+  const std::uint32_t most = std::clamp(top.root->size / 32, kMostInUnit, kMostInSubtree);
+  TopNodes nodes = choose_subtrees(top, most);
   std::vector<Chunk> chunks(nodes.leaves().size());
   std::vector<float> costs(chunks.size());
-  tbb::enumerable_thread_specific<Workplace> workplaces;
+  tbb::enumerable_thread_specific<Workplace> workplaces(most);
   tbb::parallel_for(std::size_t{0}, chunks.size(), [&](std::size_t i) {
     costs[i] = workplaces.local().build(*nodes.leaves()[i], options, leaf_triangles, input,
                                         references, octree.triangles.data(), chunks[i]);
