@@ -179,7 +179,7 @@ HWY_ATTR HWY_INLINE void prepare(const Packet& p, const float* rows, std::uint32
                                  LeafVolumes& to) {
   const Floats d;
   using V = hn::Vec<Floats>;
-  const auto row = [&](std::uint32_t r) HWY_ATTR { return hn::LoadU(d, rows + r * n); };
+  const LeafReader row(rows, n);
   const V ax = row(0), ay = row(1), az = row(2);
   const V bx = hn::Sub(ax, row(3)), by = hn::Sub(ay, row(4)), bz = hn::Sub(az, row(5));
   const V cx = hn::Sub(row(6), ax), cy = hn::Sub(row(7), ay), cz = hn::Sub(row(8), az);
@@ -316,10 +316,10 @@ HWY_ATTR HWY_INLINE std::uint32_t visit_leaf(const WideView& tree, const SceneVi
   using V = hn::Vec<Floats>;
   const std::uint32_t n = leaf_count(leaf);
   const float* rows = tree.leaf(leaf);
+  const LeafReader row(rows, n);
   V enter[3], leave[3];
   for (std::uint32_t axis = 0; axis < 3; ++axis) {
-    const V a = hn::LoadU(d, rows + axis * n), b = hn::LoadU(d, rows + (3 + axis) * n);
-    const V c = hn::LoadU(d, rows + (6 + axis) * n);
+    const V a = row(axis), b = row(3 + axis), c = row(6 + axis);
     const V lower = hn::Min(hn::Min(a, b), c), upper = hn::Max(hn::Max(a, b), c);
     const bool negative = (p.octant >> axis) & 1;
     enter[axis] = negative ? upper : lower;
