@@ -69,6 +69,26 @@ def check(folder, embree):
         assert title in text, title
 
 
+def check_views(program, folder):
+    """Views are the same for any builder, each has its rows, and the means are those of the rows."""
+    views = {}
+    for builder in ("sah", "quality"):
+        path = os.path.join(folder, builder + ".json")
+        done = subprocess.run(
+            [program, "rays", "--scene", "builtin:default", "--size", "64x48", "--views", "3", "--count",
+             "--repeats", "1", "--builder", builder, "--json", path], check=True, capture_output=True, text=True)
+        rows = read(folder, builder + ".json")
+        assert [(r["view"], r["set"]) for r in rows] == [
+            (view, name) for view in (1, 2, 3) for name in ("primary", "bounce", "ao")], rows
+        views[builder] = [row["rays"] for row in rows]
+        for name in SETS:
+            nodes = [row["nodes_per_ray"] for row in rows if row["set"] == name]
+            mean = (nodes[0] * nodes[1] * nodes[2]) ** (1 / 3)
+            line = next(l for l in done.stdout.splitlines() if l.startswith("geometric mean of 3 views " + name))
+            assert "nodes_per_ray %.2f" % mean in line, (line, nodes)
+    assert views["sah"] == views["quality"], views
+
+
 def main():
     bin_folder = os.path.abspath(sys.argv[1])
     bench = [sys.executable, os.path.join(HERE, "bench.py"), "--quick", "--bin", bin_folder]
@@ -77,6 +97,7 @@ def main():
     with tempfile.TemporaryDirectory(prefix="octrace_bench_") as folder:
         subprocess.run([*bench, "--out", folder, "--threads", "2"], check=True)
         check(folder, about["embree"])
+        check_views(os.path.join(bin_folder, "octrace-bench"), folder)
         # Sizes measured before are kept, not measured again.
         kept = [row for row in read(folder, "growth.json") if row["quads"] == 16]
         subprocess.run([*bench, "growth", "--quads", "8,16", "--out", folder], check=True,
