@@ -124,7 +124,7 @@ Opened Run::open(std::size_t index) const {
   request.build = options_.build;
   request.build.threads = options_.threads;
   request.limits = options_.limits;
-  request.moving = !job.frames.empty();
+  request.moving = request.refits = !job.frames.empty();
   if (job.animation) {
     const auto* name = std::get_if<std::string>(&*job.animation);
     request.animation =

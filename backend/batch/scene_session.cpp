@@ -94,7 +94,7 @@ util::Result<std::unique_ptr<SceneSession>> open_scene(const SceneRequest& reque
   octree::BuildOptions& build = session->build;
   build = request.build;
   build.max_bytes = request.limits.max_scene_bytes;
-  build.cuts = session->animator == nullptr;  // of no use in trees that are refitted
+  build.cuts = !(request.refits && session->animator);  // of no use in trees that are refitted
   const util::Timer build_timer;
   util::Result<octree::Octree> octree = octree::build(session->scene, build);
   if (!octree) return octree.error();

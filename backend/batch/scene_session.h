@@ -25,6 +25,7 @@ struct SceneRequest {
   std::string animation;       // --animation; where a time is given or the session is to move
   scene::Time time;            // nothing: at rest
   bool moving = false;         // keep what SceneSession::move_to() and at() need
+  bool refits = false;         // the octree is to follow many calls of move_to()
   bool collect_info = false;   // fill SceneSession::info
   bool verify = false;         // check the octree
   octree::BuildOptions build;  // max_bytes comes from limits

@@ -98,8 +98,10 @@ class BinaryBuilder {
       return;
     }
     Sides sides;
-    const Chosen chosen = choose(range, references, bounds, depth, misses);
-    divide(range, references, bounds, chosen, references_[1 - array].data(), sides);
+    Chosen chosen = choose(range, references, bounds, depth, misses);
+    if (!divide(range, references, bounds, chosen, references_[1 - array].data(), sides)) {
+      chosen.misses = misses + 1;
+    }
     write_node(tree_.nodes[root], bounds, range.pair, range.count);
     const auto lower = [&] {
       build(sides.lower, 2 * range.pair, sides.lower_bounds, 1 - array, depth + 1, chosen.misses);
@@ -203,14 +205,16 @@ class BinaryBuilder {
     Bounds8 lower_bounds, upper_bounds;
   };
 
-  // Moves the references to their sides of `to`.
-  void divide(const Range& range, Reference* from, const Bounds8& bounds, const Chosen& chosen,
+  // Moves the references to their sides of `to`. False: not as was chosen, but without cuts.
+  bool divide(const Range& range, Reference* from, const Bounds8& bounds, const Chosen& chosen,
               Reference* to, Sides& sides) const {
     const Binning binning(bounds, options_.bins);
     if (chosen.spatial.axis >= 0 && cut_all(range, from, chosen.spatial, to, sides)) {
       sides.lower_bounds = bounds_of(to + sides.lower.first, sides.lower.count);
       sides.upper_bounds = bounds_of(to + sides.upper.first, sides.upper.count);
-    } else if (chosen.object.axis >= 0) {
+      return true;
+    }
+    if (chosen.object.axis >= 0) {
       scatter(range, from, chosen.object, binning, to, sides);
     } else {
       const std::uint32_t half = split_by_rank(from, range.count, bounds);
@@ -220,6 +224,7 @@ class BinaryBuilder {
       sides.lower_bounds = bounds_of(to + sides.lower.first, sides.lower.count);
       sides.upper_bounds = bounds_of(to + sides.upper.first, sides.upper.count);
     }
+    return chosen.spatial.axis < 0;
   }
 
   struct Counts {

@@ -20,7 +20,7 @@ struct LooseRange {
   std::uint32_t total() const { return count + static_cast<std::uint32_t>(parts.size()); }
 };
 
-// The cheapest plane to cut at that makes at most `room` parts; none where axis is -1.
+// The cheapest plane to cut at that makes at most about `room` parts; none where axis is -1.
 SpatialSplit best_cut(const BuildInput& input, const LooseSplitter& splitter,
                       const LooseRange& range, const Bounds8& bounds, std::uint32_t room, int bins);
 

@@ -163,14 +163,15 @@ void fill(const BuildInput& input, const Reference* references, std::uint32_t co
     bool whole_only = false;
     for (int axis = 0; axis < 3; ++axis) {
       if (!(binning.extent[axis] > 0.0f)) continue;
-      const int first = binning.bin(whole.lower[axis], axis);
-      const int last = binning.bin(whole.upper(axis), axis);
-      int at = first;
+      int first = binning.bin(whole.lower[axis], axis);
+      int last = binning.bin(whole.upper(axis), axis);
       if (first != last && !whole_only && !cutter) {
         whole_only = !may_cut(input, whole);
         if (!whole_only) cutter.emplace(cutter_of(input, whole));
       }
-      if (first == last || whole_only) {
+      if (whole_only) first = last = binning.bin(0.5f * whole.centre2(axis), axis);
+      int at = first;
+      if (first == last) {
         join_box(bins.parts[axis][at], whole);
       } else {
         Reference rest = whole;

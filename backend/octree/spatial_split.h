@@ -59,7 +59,7 @@ bool cut(const BuildInput& input, const LooseReference& reference, int axis, flo
 // Adds references to the bins, cut at all planes.
 void fill(const BuildInput& input, const Reference* references, std::uint32_t count,
           const SpatialBinning& binning, SpatialBins& bins);
-// Of the planes that cut at most so many references.
+// Of the planes that have at most about so many references on both sides: boxes are counted.
 SpatialSplit best(const SpatialBins& bins, const SpatialBinning& binning, std::uint32_t most_cuts);
 
 }  // namespace octrace::octree

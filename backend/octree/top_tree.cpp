@@ -120,7 +120,7 @@ class TopSplitter {
     divide_by_rank(range, lower, upper);
   }
 
-  // False, and nothing changed: that would not be cheaper.
+  // False, and nothing changed: that would not be cheaper, or there is no room for the parts.
   bool divide_space(TopRange& range, float cost, TopRange& lower, TopRange& upper) const {
     const LooseRange loose{references_ + range.first, range.count, range.parts};
     const SpatialSplit chosen =

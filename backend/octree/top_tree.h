@@ -21,8 +21,8 @@ struct TopOptions {
   int bins = 16;
   int sah_depth = 64;  // binary levels; below that, ranges are halved by rank
   // Triangles are cut where the sides of a split would reach into each other by more than this part
-  // of the root's surface (ObjectSplit::overlap); the parts are at most this share of the triangles
-  // more, and cuts are no longer tried below so many nodes in line that had no use for one.
+  // of the root's surface (ObjectSplit::overlap). Parts add at most this share of the triangles.
+  // Cuts are no longer tried below so many nodes in line that had no use for one.
   int spatial_bins = 16;
   float least_overlap = 0.02f;
   float duplicates = 0.1f;  // 0: no cuts

@@ -5,6 +5,7 @@ fields. Nothing here judges a time.
     tests/bench/bench_smoke.py BIN
 """
 import json
+import math
 import os
 import subprocess
 import sys
@@ -82,10 +83,12 @@ def check_views(program, folder):
             (view, name) for view in (1, 2, 3) for name in ("primary", "bounce", "ao")], rows
         views[builder] = [row["rays"] for row in rows]
         for name in SETS:
-            nodes = [row["nodes_per_ray"] for row in rows if row["set"] == name]
-            mean = (nodes[0] * nodes[1] * nodes[2]) ** (1 / 3)
-            line = next(l for l in done.stdout.splitlines() if l.startswith("geometric mean of 3 views " + name))
-            assert "nodes_per_ray %.2f" % mean in line, (line, nodes)
+            line = next(l for l in done.stdout.splitlines() if l.startswith("mean of 3 views, %s:" % name))
+            rate = math.exp(sum(math.log(r["mrays_per_s"]) for r in rows if r["set"] == name) / 3)
+            assert "mrays_per_s %.2f" % rate in line, (line, rate)
+            for key in ("nodes_per_ray", "triangles_per_ray"):
+                mean = sum(row[key] for row in rows if row["set"] == name) / 3
+                assert "%s %.2f" % (key, mean) in line, (line, mean)
     assert views["sah"] == views["quality"], views
 
 

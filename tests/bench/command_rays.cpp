@@ -178,20 +178,32 @@ util::Result<octree::Octree> build(const Options& options, const scene::Scene& s
   return octree::build(scene, build);
 }
 
-// The geometric means over the views of a scene, whose rows are those from `first` on.
+bool is_count(const std::string& key) { return key.ends_with("_per_ray"); }
+
+// The means over the views of a scene, whose rows are those from `first` on: geometric ones of
+// rates, arithmetic ones of counts. Views whose set has no rays have no part in them.
 void print_means(const nlohmann::json& rows, std::size_t first) {
-  std::map<std::string, std::map<std::string, double>> logarithms;
-  double views = 0.0;
+  struct Sum {
+    double value = 0.0;
+    int views = 0;
+  };
+  std::map<std::string, std::map<std::string, Sum>> sums;
   for (std::size_t i = first; i < rows.size(); ++i) {
-    views = std::max(views, rows[i]["view"].get<double>());
+    if (rows[i]["rays"] == 0) continue;
     for (const char* key : {"mrays_per_s", "ratio", "nodes_per_ray", "triangles_per_ray"}) {
       if (!rows[i].contains(key)) continue;
-      logarithms[rows[i]["set"]][key] += std::log(rows[i][key].get<double>());
+      const double value = rows[i][key];
+      Sum& sum = sums[rows[i]["set"]][key];
+      sum.value += is_count(key) ? value : std::log(value);
+      ++sum.views;
     }
   }
-  for (const auto& [set, sums] : logarithms) {
-    fmt::print("geometric mean of {} views {:<8}", views, set);
-    for (const auto& [key, sum] : sums) fmt::print(" {} {:.2f}", key, std::exp(sum / views));
+  for (const auto& [set, keys] : sums) {
+    fmt::print("mean of {} views, {}:", keys.begin()->second.views, set);
+    for (const auto& [key, sum] : keys) {
+      const double mean = sum.value / sum.views;
+      fmt::print(" {} {:.2f}", key, is_count(key) ? mean : std::exp(mean));
+    }
     fmt::print("\n");
   }
 }
@@ -231,6 +243,9 @@ int run(const Options& options) {
     }
     const std::vector<scene::Camera> cameras =
         options.views == 0 ? std::vector<scene::Camera>{*camera} : bench.views();
+    if (cameras.empty()) {
+      return fail({util::Exit::usage, "", "--views needs a scene with a surface", "", ""});
+    }
     for (const scene::Camera& view : cameras) {
       if (!bench.run(scene::make_ray_camera(view, width, height), width, height, rows)) return 1;
     }
@@ -278,6 +293,7 @@ void add_rays_command(CLI::App& app, int& exit_code) {
   command
       ->add_option("--views", options->views,
                    "Instead of one camera, so many from all over the scene, and their means")
+      ->excludes("--camera")
       ->check(CLI::Range(0u, 1000u));
   command->add_flag("--count", options->count, "Count nodes and triangles tested a ray");
   command->add_option("--json", options->json, "Write the rows to this file");

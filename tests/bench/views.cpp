@@ -25,6 +25,8 @@ class Surface {
     }
   }
 
+  double area() const { return areas_.empty() ? 0.0 : areas_.back(); }
+
   Point random_point(std::mt19937_64& random) const {
     const double at = uniform(random) * areas_.back();
     const auto found = std::upper_bound(areas_.begin(), areas_.end() - 1, at);
@@ -52,8 +54,8 @@ class Surface {
 
 std::vector<scene::Camera> scattered_views(const scene::Scene& scene, const octree::Octree& octree,
                                            const octree::WideOctree& wide, std::uint32_t count) {
-  if (scene.triangles.empty()) return {};
   const Surface surface(scene);
+  if (!(surface.area() > 0.0)) return {};
   const double diagonal =
       glm::length(glm::dvec3(scene.bounds.upper) - glm::dvec3(scene.bounds.lower));
   std::mt19937_64 random(1);

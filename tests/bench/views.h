@@ -11,6 +11,7 @@ namespace octrace::bench {
 
 // From in front of points of the surface, spread evenly over it, half way to what lies opposite and
 // at most a tenth of the scene's diagonal away, towards other such points. The same for any tree.
+// None where the scene has no surface.
 std::vector<scene::Camera> scattered_views(const scene::Scene& scene, const octree::Octree& octree,
                                            const octree::WideOctree& wide, std::uint32_t count);
 

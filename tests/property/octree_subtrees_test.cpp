@@ -60,8 +60,7 @@ struct LargeMesh {
 // 65536 on its units have 1024 references (unit_size() in top_tree.cpp).
 std::vector<LargeMesh> large_meshes() {
   std::vector<LargeMesh> meshes;
-  for (const std::uint32_t count :
-       {64u, 65u, 4096u, 8191u, 8192u, 8193u, 65535u, 65536u, 100000u}) {
+  for (const std::uint32_t count : {64u, 65u, 1024u, 1025u, 8192u, 65535u, 65536u, 262145u}) {
     meshes.push_back({"dust_" + std::to_string(count), [count] { return make_dust(count); }});
   }
   const auto add = [&](const char* name, std::uint32_t count, const Corner& corner) {
@@ -363,10 +362,10 @@ TEST(OctreeOfBlendedTriangles, HasNoCuts) {
   EXPECT_TRUE(octree::verify(octree, input));
 }
 
-// Ever smaller triangles in a row, down to surfaces that vanish, of which an eight-way node takes
-// no more than two: too deep, so that halves by rank are left, which end in leaves at the eleventh
-// level.
-TEST(OctreeOfAChain, FallsBackToHalvesByRank) {
+// Ever smaller triangles in a row, of which an eight-way node takes no more than two. Down to
+// surfaces that vanish the tree would be too deep, and halves by rank are left, whose leaves end at
+// the eleventh level.
+TEST(OctreeOfAChain, IsOfHalvesByRankWhereItWouldBeTooDeep) {
   constexpr std::uint32_t kCount = 6000;
   for (const int least : {-20, -71}) {
     const Mesh mesh = make("chain", kCount, [&](std::uint32_t i, int c, std::mt19937_64&) {
