@@ -46,8 +46,8 @@ struct TransmittanceQuery {
 };
 
 // Rows of a leaf as vectors. What lies behind a row of few triangles reads as zero: it would be
-// other rows, and indices and flags are denormal as floats; an instruction that meets a denormal
-// number takes Intel's processors a hundred cycles more.
+// other rows, and indices and flags are denormal as floats; instructions that meet denormal
+// numbers took an Intel processor half of its time (docs/performance.md).
 class LeafReader {
  public:
   HWY_ATTR HWY_INLINE LeafReader(const float* rows, std::uint32_t n)
