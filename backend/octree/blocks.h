@@ -1,29 +1,41 @@
 // Memory for a thread's arrays that live until all threads are done.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <memory>
-#include <vector>
+
+#include "backend/util/huge_array.h"
 
 namespace octrace::octree {
 
-// Elements stay where they are. Blocks are of `kSize`, which no array may exceed.
-template <class T, std::size_t kSize>
+// Arrays in blocks, which last as long as there is an array in them.
+template <class T>
 class Blocks {
  public:
+  using Block = std::shared_ptr<util::HugeArray<T>>;
+
+  // `size`: of blocks; no array may be larger.
+  explicit Blocks(std::size_t size) : size_(size) {}
+
   // Room for as many as may come, of which use() then keeps those that came.
   T* reserve(std::size_t most) {
     if (free_ < most) {
-      blocks_.push_back(std::make_unique_for_overwrite<T[]>(kSize));
-      free_ = kSize;
+      block_ = std::make_shared<util::HugeArray<T>>(size_, util::kHugePage);
+      free_ = size_;
     }
-    return blocks_.back().get() + (kSize - free_);
+    return block_->data() + (size_ - free_);
   }
-  void use(std::size_t count) { free_ -= count; }
+  // Returns what keeps them.
+  Block use(std::size_t count) {
+    free_ -= count;
+    return block_;
+  }
 
  private:
-  std::vector<std::unique_ptr<T[]>> blocks_;
-  std::size_t free_ = 0;  // of the last block
+  const std::size_t size_;
+  Block block_;
+  std::size_t free_ = 0;
 };
 
 }  // namespace octrace::octree

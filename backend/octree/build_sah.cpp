@@ -1,6 +1,7 @@
 // The SAH builders. `sah`: the top of a binary tree with cuts (top_tree.h), subtrees in cache below
-// (build_subtrees.h). `quality`: a whole binary tree with more cuts (build_binary.h), improved by
-// re-insertion (reinsert.h), collapsed into eight-way nodes (collapse.h).
+// (build_subtrees.h), with re-insertion (reinsert.h) of what is large. `quality`: a whole binary tree
+// with more cuts (build_binary.h), more of it re-inserted, collapsed into eight-way nodes
+// (collapse.h).
 #include <algorithm>
 #include <stdexcept>
 
@@ -29,11 +30,11 @@ BinaryOptions quality_options() {
 // Share of triangles from which a tree counts as one with cuts.
 constexpr double kManyCuts = 0.01;
 
-ReinsertOptions reinsert_options() {
+ReinsertOptions reinsert_options(const BinaryTree& tree) {
   ReinsertOptions options;
   options.rounds = 10;
-  options.share = 0.1f;
-  options.last_gain = 0.02f;  // moves may take turns for ever
+  const std::uint32_t references = tree.nodes[BinaryTree::kRoot].plan;
+  options.most = std::max(references / 5, 1u);  // a tenth of the nodes
   return options;
 }
 
@@ -55,7 +56,7 @@ bool build_quality(const BuildInput& input, bool cuts, std::uint32_t leaf_triang
   BinaryOptions options = quality_options();
   if (!cuts) options.duplicates = 0.0f;
   BinaryTree tree = build_binary(input, options);
-  reinsert(tree, reinsert_options());
+  reinsert(tree.nodes.data(), tree.nodes.size(), reinsert_options(tree));
   return collapse(tree, leaf_triangles, input, octree);
 }
 
@@ -80,6 +81,7 @@ void build_sah(const BuildInput& input, const SahOptions& options, Octree& octre
   // are no more eight-way ones.
   TopOptions plain = fast_options(false);
   plain.sah_depth = 0;
+  plain.reinsert_rounds = 0;
   if (!build_fast(input, plain, options.leaf_triangles, octree)) {
     throw std::logic_error("an octree of halves by rank is too deep");
   }

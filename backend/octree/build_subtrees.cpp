@@ -7,14 +7,20 @@
 
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cstring>
+#include <functional>
 #include <unordered_set>
+#include <utility>
 
 #include "backend/octree/blocks.h"
 #include "backend/octree/node_writer.h"
 #include "backend/octree/plan.h"
+#include "backend/octree/reinsert.h"
+#include "backend/util/huge_memory.h"
 
 namespace octrace::octree {
 
@@ -27,29 +33,42 @@ struct Chunk {
   const kernels::Node* nodes = nullptr;
   std::uint32_t size = 0;
   int height = 0;
-  std::unique_ptr<kernels::LeafTriangle[]> rest;  // leaf triangles after as many as references
+  Blocks<kernels::Node>::Block block{};             // where the nodes are
+  std::unique_ptr<kernels::LeafTriangle[]> rest{};  // leaf triangles after as many as references
+};
+
+// What all subtrees share.
+struct Subtrees {
+  const TopOptions& options;
+  ReinsertOptions reinsert;
+  std::uint32_t leaf_triangles;
+  const BuildInput& input;
+  const LooseReference* references;
+  kernels::LeafTriangle* triangles;
+  std::uint32_t most;       // references of a subtree
+  std::size_t block_nodes;  // for those of several subtrees
 };
 
 class Workplace {
  public:
-  explicit Workplace(std::uint32_t most)
-      : most_(most),
-        nodes_(std::make_unique_for_overwrite<BinaryNode[]>(2 * std::size_t{most})),
-        local_(std::make_unique_for_overwrite<LocalTriangle[]>(most)) {}
+  explicit Workplace(const Subtrees& all)
+      : all_(all),
+        nodes_(std::make_unique_for_overwrite<BinaryNode[]>(2 * std::size_t{all.most})),
+        local_(std::make_unique_for_overwrite<LocalTriangle[]>(all.most)),
+        written_(all.block_nodes) {}
 
-  // Returns the subtree's cost in one slot.
-  float build(const TopRange& range, const TopOptions& options, std::uint32_t leaf_triangles,
-              const BuildInput& input, const LooseReference* references,
-              kernels::LeafTriangle* triangles, Chunk& chunk) {
-    room_.build(range, options, references, nodes_.get(), local_.get());
-    const float cost = plan_subtree(nodes_.get(), leaf_triangles);
+  // Finds the subtree's cost in one slot as well. False: it is too deep.
+  bool build(const TopRange& range, Chunk& chunk, float& cost) {
+    room_.build(range, all_.options, all_.references, nodes_.get(), local_.get());
+    reinsert(nodes_.get(), 2 * std::size_t{range.size}, all_.reinsert);
+    if (!plan_subtree(nodes_.get(), all_.leaf_triangles, cost)) return false;
     // Every node but a subtree's root has two children or more, so there are not more of them.
     kernels::Node* const to = written_.reserve(range.size);
     NodeWriter::Place place{1, 0};
-    kernels::LeafTriangle* const own = triangles + range.first;
+    kernels::LeafTriangle* const own = all_.triangles + range.first;
     const std::uint32_t rest = range.size - range.count;
     kernels::LeafTriangle* const leaves = rest == 0 ? own : more_triangles();
-    chunk.height = NodeWriter(nodes_.get(), input, local_.get(), to, leaves)
+    chunk.height = NodeWriter(nodes_.get(), all_.input, local_.get(), to, leaves)
                        .write_all(BinaryTree::kRoot, 0, place);
     if (leaves != own) {
       std::copy_n(leaves, range.count, own);
@@ -58,24 +77,24 @@ class Workplace {
     }
     chunk.nodes = to;
     chunk.size = place.node;
-    written_.use(place.node);
-    return cost;
+    chunk.block = written_.use(place.node);
+    return true;
   }
 
  private:
   kernels::LeafTriangle* more_triangles() {
     if (!triangles_) {
-      triangles_ = std::make_unique_for_overwrite<kernels::LeafTriangle[]>(most_);
+      triangles_ = std::make_unique_for_overwrite<kernels::LeafTriangle[]>(all_.most);
     }
     return triangles_.get();
   }
 
-  const std::uint32_t most_;
+  const Subtrees& all_;
   SubtreeRoom room_;
   std::unique_ptr<BinaryNode[]> nodes_;
   std::unique_ptr<LocalTriangle[]> local_;
   std::unique_ptr<kernels::LeafTriangle[]> triangles_;
-  Blocks<kernels::Node, 2 * kMostInSubtree> written_;
+  Blocks<kernels::Node> written_;
 };
 
 // The top as a binary tree whose leaves stand for ranges, and have their numbers.
@@ -117,8 +136,8 @@ class TopNodes {
 
 class TopWriter {
  public:
-  TopWriter(TopNodes& top, const std::vector<Chunk>& chunks, const BuildInput& input,
-            Octree& octree)
+  // Takes the chunks' memory.
+  TopWriter(TopNodes& top, std::vector<Chunk>& chunks, const BuildInput& input, Octree& octree)
       : nodes_(top.nodes()),
         subtrees_(top.leaves()),
         chunks_(chunks),
@@ -128,11 +147,15 @@ class TopWriter {
 
   bool run() {
     if (measure(BinaryTree::kRoot, 1) > kernels::kMaxDepth) return false;
-    octree_.nodes.resize(sizes_[BinaryTree::kRoot]);
-    const NodeWriter writer(nodes_, input_, octree_.nodes.data(), octree_.triangles.data());
-    write(writer, BinaryTree::kRoot, 0, 1);
+    place(BinaryTree::kRoot, 0, 1);
     spread_triangles();
+    octree_.nodes.resize(sizes_[BinaryTree::kRoot]);
+    // As they were built, so that their memory is given back while that of the octree is taken.
+    std::sort(jobs_.begin(), jobs_.end(),
+              [](const Job& a, const Job& b) { return a.subtree < b.subtree; });
     tbb::parallel_for(std::size_t{0}, jobs_.size(), [&](std::size_t i) { copy(jobs_[i]); });
+    for (const auto& [at, node] : top_) octree_.nodes[at] = node;
+    for (const Job& job : jobs_) octree_.nodes[job.root] = job.node;
     return true;
   }
 
@@ -140,6 +163,7 @@ class TopWriter {
   // Where a subtree goes: its root, and what is below that.
   struct Job {
     std::uint32_t subtree, root, below;
+    kernels::Node node{};  // the root, once the rest is there
   };
 
   // Counts the eight-way nodes. Returns the depth of the lowest.
@@ -160,26 +184,32 @@ class TopWriter {
     return lowest;
   }
 
-  void write(const NodeWriter& writer, std::uint32_t index, std::uint32_t at, std::uint32_t below) {
+  // The nodes above subtrees wait, as subtrees' roots do: they lie far apart, and each would take a
+  // page of memory before its time.
+  void place(std::uint32_t index, std::uint32_t at, std::uint32_t below) {
     if (nodes_[index].leaf()) {
       jobs_.push_back({nodes_[index].triangle(), at, below});
       return;
     }
     const Family family(nodes_, index);
     std::array<std::uint8_t, kChildren> order;
-    NodeWriter::Place place{below, 0};
-    const int inner = writer.write(family, at, place, order);
+    NodeWriter::Place next{below, 0};
+    kernels::Node node;
+    const int inner =
+        NodeWriter(nodes_, input_, &node, octree_.triangles.data()).write(family, 0, next, order);
+    top_.emplace_back(at, node);
     for (int i = 0; i < inner; ++i, ++below) {
       const std::uint32_t child = family.index[order[i]];
-      write(writer, child, below, place.node);
-      place.node += sizes_[child] - 1;
+      place(child, below, next.node);
+      next.node += sizes_[child] - 1;
     }
   }
 
-  void copy(const Job& job) {
-    const Chunk& chunk = chunks_[job.subtree];
-    copy_subtree(chunk.nodes, chunk.size, octree_.nodes.data(), job.root,
+  void copy(Job& job) {
+    Chunk& chunk = chunks_[job.subtree];
+    copy_subtree(chunk.nodes, chunk.size, octree_.nodes.data(), job.node,
                  {job.below, subtrees_[job.subtree]->place});
+    chunk.block.reset();
   }
 
   // Makes room in front of the leaf triangles for what others have more than references, from the
@@ -195,16 +225,18 @@ class TopWriter {
       }
       std::copy_n(chunks_[i].rest.get(), range.size - range.count,
                   triangles + range.place + range.count);
+      chunks_[i].rest.reset();
     }
   }
 
   const BinaryNode* const nodes_;
   const std::vector<const TopRange*>& subtrees_;
-  const std::vector<Chunk>& chunks_;
+  std::vector<Chunk>& chunks_;
   const BuildInput& input_;
   Octree& octree_;
   std::vector<std::uint32_t> sizes_;  // by binary node: eight-way nodes of its subtree
   std::vector<Job> jobs_;
+  std::vector<std::pair<std::uint32_t, kernels::Node>> top_;  // nodes above subtrees, by place
 };
 
 // Adds the topmost ranges that are small enough for a subtree, and are likely to be eight-way nodes
@@ -222,28 +254,52 @@ void add_subtrees(const TopNodes& top, const BinaryNode* nodes, std::uint32_t ro
 
 TopNodes choose_subtrees(const TopTree& top, std::uint32_t most) {
   TopNodes units(top, [](const TopRange&) { return false; });
-  guess_top(units.nodes());
+  guess_top(units.nodes());  // no deeper than the splits
   std::unordered_set<const TopRange*> subtrees;
   add_subtrees(units, units.nodes(), BinaryTree::kRoot, most, subtrees);
   return TopNodes(top, [&](const TopRange& range) { return subtrees.contains(&range); });
+}
+
+// Blocks of a large page each, where every thread fills one; smaller ones where those would stay
+// empty.
+std::size_t block_nodes(std::uint32_t references, std::uint32_t most) {
+  constexpr std::size_t kLarge = util::kHugePage / sizeof(kernels::Node) + 1;
+  const auto threads = static_cast<std::uint32_t>(tbb::this_task_arena::max_concurrency());
+  const std::size_t expected = std::size_t{references} / threads / 8;  // measured
+  return std::max(expected >= kLarge ? kLarge : 0, 2 * std::size_t{most});
+}
+
+bool build_all(const TopNodes& top, const Subtrees& all, std::vector<Chunk>& chunks,
+               std::vector<float>& costs) {
+  std::atomic<bool> built{true};
+  tbb::enumerable_thread_specific<Workplace> workplaces(std::cref(all));
+  tbb::parallel_for(std::size_t{0}, chunks.size(), [&](std::size_t i) {
+    if (!workplaces.local().build(*top.leaves()[i], chunks[i], costs[i])) built = false;
+  });
+  return built;
 }
 
 }  // namespace
 
 bool build_subtrees(const TopTree& top, const TopOptions& options, std::uint32_t leaf_triangles,
                     const BuildInput& input, const LooseReference* references, Octree& octree) {
+  ReinsertOptions reinsertion;
+  reinsertion.rounds = options.reinsert_rounds;
+  ReinsertOptions in_subtrees = reinsertion;
+  in_subtrees.least_area = options.reinsert_area * top.root->bounds.half_area();
+  in_subtrees.parallel = false;
   // Enough subtrees for many threads, which need room for one each.
   const std::uint32_t most = std::clamp(top.root->size / 32, kMostInUnit, kMostInSubtree);
   TopNodes nodes = choose_subtrees(top, most);
+  const Subtrees all{options,        in_subtrees,
+                     leaf_triangles, input,
+                     references,     octree.triangles.data(),
+                     most,           block_nodes(top.root->size, most)};
   std::vector<Chunk> chunks(nodes.leaves().size());
   std::vector<float> costs(chunks.size());
-  tbb::enumerable_thread_specific<Workplace> workplaces(most);
-  tbb::parallel_for(std::size_t{0}, chunks.size(), [&](std::size_t i) {
-    costs[i] = workplaces.local().build(*nodes.leaves()[i], options, leaf_triangles, input,
-                                        references, octree.triangles.data(), chunks[i]);
-  });
-  plan_top(nodes.nodes(), costs.data());
-  return TopWriter(nodes, chunks, input, octree).run();
+  if (!build_all(nodes, all, chunks, costs)) return false;
+  reinsert(nodes.nodes(), nodes.size(), reinsertion);
+  return plan_top(nodes.nodes(), costs.data()) && TopWriter(nodes, chunks, input, octree).run();
 }
 
 }  // namespace octrace::octree

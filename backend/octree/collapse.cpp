@@ -25,6 +25,8 @@ constexpr std::uint32_t kParallel = 4096;  // references worth a task
 struct Draft {
   const kernels::Node* nodes = nullptr;
   const std::uint32_t* triangles = nullptr;
+  Blocks<kernels::Node>::Block nodes_block{};
+  Blocks<std::uint32_t>::Block triangles_block{};
 };
 
 struct Size {
@@ -70,8 +72,8 @@ class Writer {
   using Place = NodeWriter::Place;
 
   struct Desk {
-    Blocks<kernels::Node, 4 * kParallel> nodes;
-    Blocks<std::uint32_t, 16 * kParallel> triangles;
+    Blocks<kernels::Node> nodes{4 * kParallel};
+    Blocks<std::uint32_t> triangles{16 * kParallel};
   };
 
   struct Job {
@@ -123,9 +125,7 @@ class Writer {
     std::uint32_t* const triangles = desk.triangles.reserve(kParallel);
     Place place{1, 0};
     const int height = NodeWriter(nodes_, input_, nodes, triangles).write_all(root, 0, place);
-    desk.nodes.use(place.node);
-    desk.triangles.use(place.triangle);
-    draft = {nodes, triangles};
+    draft = {nodes, triangles, desk.nodes.use(place.node), desk.triangles.use(place.triangle)};
     return {place.node, place.triangle, height};
   }
 
@@ -148,7 +148,8 @@ class Writer {
   }
 
   void copy(const Job& job) {
-    copy_subtree(job.draft.nodes, job.size.nodes, octree_.nodes.data(), job.root, job.place);
+    copy_subtree(job.draft.nodes, job.size.nodes, octree_.nodes.data(), octree_.nodes[job.root],
+                 job.place);
     write_triangles(input_, job.draft.triangles, job.size.triangles,
                     octree_.triangles.data() + job.place.triangle);
   }

@@ -16,7 +16,21 @@ HWY_ATTR Bounds8 loose_bounds(const LooseReference* references, std::uint32_t co
 
 HWY_ATTR void loose_fill(const LooseReference* references, std::uint32_t count,
                          const Binning& binning, ObjectBins& bins) {
-  fill_bins(references, count, binning, bins);
+  constexpr std::uint32_t kMany = 512;  // worth clearing and joining other bins
+  if (count < kMany) {
+    fill_bins(references, count, binning, bins, bins);
+    return;
+  }
+  ObjectBins others;
+  clear(others, binning.bins);
+  fill_bins(references, count, binning, bins, others);
+  for (int axis = 0; axis < 3; ++axis) {
+    for (int bin = 0; bin < binning.bins; ++bin) {
+      float* row = bins.boxes[axis][bin];
+      store(lesser(load(row), load(others.boxes[axis][bin])), row);
+      bins.counts[axis][bin] += others.counts[axis][bin];
+    }
+  }
 }
 
 // Without branches on the side, which nothing could predict.

@@ -152,13 +152,13 @@ void write_triangles(const BuildInput& input, const std::uint32_t* names, std::u
 }
 
 void copy_subtree(const kernels::Node* from, std::uint32_t size, kernels::Node* nodes,
-                  std::uint32_t root, const NodeWriter::Place& place) {
+                  kernels::Node& root, const NodeWriter::Place& place) {
   const auto move = [&](const kernels::Node& node, kernels::Node& to) {
     to = node;
     to.first_child += place.node - 1;
     to.first_triangle += place.triangle;
   };
-  move(from[0], nodes[root]);
+  move(from[0], root);
   for (std::uint32_t i = 1; i < size; ++i) move(from[i], nodes[place.node + i - 1]);
 }
 

@@ -70,8 +70,8 @@ void write_triangles(const BuildInput& input, const std::uint32_t* names, std::u
                      kernels::LeafTriangle* to);
 
 // Moves a subtree, whose root is `from` and whose other nodes follow in places 1 to size - 1, among
-// other nodes: its root to nodes[root], all below to `place`.
+// other nodes: its root to `root`, all below to `place` of `nodes`.
 void copy_subtree(const kernels::Node* from, std::uint32_t size, kernels::Node* nodes,
-                  std::uint32_t root, const NodeWriter::Place& place);
+                  kernels::Node& root, const NodeWriter::Place& place);
 
 }  // namespace octrace::octree

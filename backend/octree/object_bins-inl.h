@@ -28,9 +28,11 @@ HWY_ATTR HWY_INLINE void clear(ObjectBins& bins, int count) {
 
 // The bins of a few references first and then the boxes, so that the processor knows all addresses
 // by the time it loads from them: references of one bin often follow each other.
+// Every other one goes to `others`, which may be the same bins: where they are not, a reference does
+// not wait for what the one before, of the same bin, has stored.
 template <class R>
 HWY_ATTR HWY_INLINE void fill_bins(const R* references, std::uint32_t count, const Binning& binning,
-                                   ObjectBins& bins) {
+                                   ObjectBins& bins, ObjectBins& others) {
   constexpr std::uint32_t kFew = 32;
   alignas(16) std::int32_t bin[kFew][4];
 #if HWY_TARGET != HWY_SCALAR
@@ -52,14 +54,20 @@ HWY_ATTR HWY_INLINE void fill_bins(const R* references, std::uint32_t count, con
       for (int axis = 0; axis < 3; ++axis) bin[i][axis] = binning.bin(from[i].centre2(axis), axis);
 #endif
     }
-    for (std::uint32_t i = 0; i < few; ++i) {
+    const auto add = [&](std::uint32_t i, ObjectBins& to) HWY_ATTR {
       const Box8 box = load(from[i]);
       for (int axis = 0; axis < 3; ++axis) {
-        float* to = bins.boxes[axis][bin[i][axis]];
-        store(lesser(load(to), box), to);
-        ++bins.counts[axis][bin[i][axis]];
+        float* row = to.boxes[axis][bin[i][axis]];
+        store(lesser(load(row), box), row);
+        ++to.counts[axis][bin[i][axis]];
       }
+    };
+    std::uint32_t i = 0;
+    for (; i + 1 < few; i += 2) {
+      add(i, bins);
+      add(i + 1, others);
     }
+    if (i < few) add(i, bins);
   }
 }
 

@@ -20,7 +20,7 @@ HWY_ATTR Bounds8 bounds(const Reference* references, std::uint32_t count) {
 
 HWY_ATTR void fill(const Reference* references, std::uint32_t count, const Binning& binning,
                    ObjectBins& bins) {
-  fill_bins(references, count, binning, bins);
+  fill_bins(references, count, binning, bins, bins);
 }
 
 HWY_ATTR ObjectSplit best(const ObjectBins& bins, int count) {
@@ -106,7 +106,7 @@ class Subtree {
       // Few bins tell few references apart.
       const Binning binning(bounds, count <= kFew ? 8 : range_.bins);
       clear(bins_, binning.bins);
-      fill_bins(references, count, binning, bins_);
+      fill_bins(references, count, binning, bins_, bins_);
       const ObjectSplit chosen = best_split(bins_, binning.bins);
       if (chosen.axis >= 0) return partition(references, count, binning, chosen, lower, upper);
     }

@@ -162,9 +162,9 @@ HWY_ATTR bool plan_triangles(BinaryNode* nodes, std::uint32_t leaf_triangles, bo
   return Planner(nodes, Leaf::triangle, leaf_triangles, nullptr, parallel).run(cost);
 }
 
-HWY_ATTR void plan_subtrees(BinaryNode* nodes, const float* costs) {
+HWY_ATTR bool plan_subtrees(BinaryNode* nodes, const float* costs) {
   float cost;
-  Planner(nodes, costs != nullptr ? Leaf::subtree : Leaf::guess, 0, costs, false).run(cost);
+  return Planner(nodes, costs != nullptr ? Leaf::subtree : Leaf::guess, 0, costs, false).run(cost);
 }
 
 }  // namespace octrace::octree::HWY_NAMESPACE
@@ -181,17 +181,15 @@ bool plan(BinaryNode* nodes, std::uint32_t leaf_triangles) {
   return HWY_DYNAMIC_DISPATCH(plan_triangles)(nodes, leaf_triangles, true, cost);
 }
 
-float plan_subtree(BinaryNode* nodes, std::uint32_t leaf_triangles) {
-  float cost;
-  HWY_DYNAMIC_DISPATCH(plan_triangles)(nodes, leaf_triangles, false, cost);
-  return cost;
+bool plan_subtree(BinaryNode* nodes, std::uint32_t leaf_triangles, float& cost) {
+  return HWY_DYNAMIC_DISPATCH(plan_triangles)(nodes, leaf_triangles, false, cost);
 }
 
-void plan_top(BinaryNode* nodes, const float* costs) {
-  HWY_DYNAMIC_DISPATCH(plan_subtrees)(nodes, costs);
+bool plan_top(BinaryNode* nodes, const float* costs) {
+  return HWY_DYNAMIC_DISPATCH(plan_subtrees)(nodes, costs);
 }
 
-void guess_top(BinaryNode* nodes) { HWY_DYNAMIC_DISPATCH(plan_subtrees)(nodes, nullptr); }
+bool guess_top(BinaryNode* nodes) { return HWY_DYNAMIC_DISPATCH(plan_subtrees)(nodes, nullptr); }
 
 }  // namespace octrace::octree
 #endif

@@ -21,12 +21,12 @@ inline bool is_leaf(const BinaryNode& node) { return (node.plan & kLeafPlan) != 
 
 // Overwrites the plans of the tree whose root is nodes[kRoot]. False: it is too deep to be of use.
 bool plan(BinaryNode* nodes, std::uint32_t leaf_triangles);
-// The same for a small tree, which one thread takes. Returns its cost in one slot.
-float plan_subtree(BinaryNode* nodes, std::uint32_t leaf_triangles);
+// The same for a small tree, which one thread takes. Finds its cost in one slot.
+bool plan_subtree(BinaryNode* nodes, std::uint32_t leaf_triangles, float& cost);
 // The same where leaf i stands for a subtree that takes one slot at cost costs[i].
-void plan_top(BinaryNode* nodes, const float* costs);
+bool plan_top(BinaryNode* nodes, const float* costs);
 // The same where leaves stand for subtrees that are not built yet: what they cost more or less in
 // any number of slots is guessed from their surface.
-void guess_top(BinaryNode* nodes);
+bool guess_top(BinaryNode* nodes);
 
 }  // namespace octrace::octree

@@ -29,18 +29,16 @@ struct Move {
 
 class Reinserter {
  public:
-  explicit Reinserter(BinaryTree& tree)
-      : nodes_(tree.nodes.data()),
-        parents_(std::make_unique_for_overwrite<Index[]>(tree.nodes.size())),
-        references_(nodes_[kRoot].plan),
-        touched_(tree.nodes.size(), false) {
+  Reinserter(BinaryNode* nodes, std::size_t size, bool parallel)
+      : nodes_(nodes),
+        parents_(std::make_unique_for_overwrite<Index[]>(size)),
+        parallel_(parallel),
+        touched_(size, false) {
     parents_[kRoot] = 0;
   }
 
   void run(const ReinsertOptions& options) {
-    const auto count = std::max<std::size_t>(
-        1, static_cast<std::size_t>(options.share * 2.0f * static_cast<float>(references_)));
-    std::vector<Index> candidates = largest(count);
+    std::vector<Index> candidates = largest(options.most, options.least_area);
     float first_gain = 0.0f;
     for (int i = 0; i < options.rounds && !candidates.empty(); ++i) {
       const float gain = round(candidates);
@@ -55,13 +53,18 @@ class Reinserter {
   // surfaces fell.
   float round(std::vector<Index>& candidates) {
     std::vector<Move> moves(candidates.size());
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, candidates.size(), 16),
-                      [&](const auto& range) {
-                        Search search;
-                        for (std::size_t i = range.begin(); i < range.end(); ++i) {
-                          moves[i] = find(candidates[i], search);
-                        }
-                      });
+    const auto search_all = [&](const auto& range) {
+      Search search;
+      for (std::size_t i = range.begin(); i < range.end(); ++i) {
+        moves[i] = find(candidates[i], search);
+      }
+    };
+    const tbb::blocked_range<std::size_t> all_candidates(0, candidates.size(), 16);
+    if (parallel_) {
+      tbb::parallel_for(all_candidates, search_all);
+    } else {
+      search_all(all_candidates);
+    }
     std::erase_if(moves, [](const Move& move) { return move.gain <= 0.0f; });
     // Before anything moves: the searches saw this tree.
     for (const Move& move : moves) link(move);
@@ -107,12 +110,11 @@ class Reinserter {
 
   // The nodes of the largest surfaces: as none is larger than its parent, they are found from the
   // root down. Children of the root cannot move. Sets the parents of what it sees.
-  std::vector<Index> largest(std::size_t count) {
+  std::vector<Index> largest(std::size_t count, float least_area) {
     using Entry = std::pair<float, Index>;
     std::vector<Entry> heap = {{nodes_[kRoot].half_area(), kRoot}};
     std::vector<Index> found;
-    found.reserve(count);
-    while (!heap.empty() && found.size() < count) {
+    while (!heap.empty() && found.size() < count && heap.front().first > least_area) {
       std::pop_heap(heap.begin(), heap.end());
       const Index index = heap.back().second;
       heap.pop_back();
@@ -230,16 +232,16 @@ class Reinserter {
 
   BinaryNode* nodes_;
   std::unique_ptr<Index[]> parents_;
-  std::uint32_t references_;
+  const bool parallel_;
   std::vector<bool> touched_;  // by moves of this round
   std::vector<Index> touched_list_;
 };
 
 }  // namespace
 
-void reinsert(BinaryTree& tree, const ReinsertOptions& options) {
-  if (options.rounds == 0 || tree.nodes[kRoot].leaf()) return;
-  Reinserter(tree).run(options);
+void reinsert(BinaryNode* nodes, std::size_t size, const ReinsertOptions& options) {
+  if (options.rounds == 0 || nodes[kRoot].leaf()) return;
+  Reinserter(nodes, size, options.parallel).run(options);
 }
 
 }  // namespace octrace::octree

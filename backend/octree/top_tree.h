@@ -18,15 +18,20 @@ inline constexpr std::uint32_t kMostInUnit = 1024;
 inline constexpr std::uint32_t kMostInSubtree = 8192;
 
 struct TopOptions {
-  int bins = 16;
+  int bins = 32;       // of ranges above units
+  int unit_bins = 16;  // and in them
   int sah_depth = 64;  // binary levels; below that, ranges are halved by rank
   // Triangles are cut where the sides of a split would reach into each other by more than this part
   // of the root's surface (ObjectSplit::overlap). Parts add at most this share of the triangles.
   // Cuts are no longer tried below so many nodes in line that had no use for one.
-  int spatial_bins = 16;
-  float least_overlap = 0.02f;
+  int spatial_bins = 32;
+  float least_overlap = 0.01f;
   float duplicates = 0.1f;  // 0: no cuts
   int spatial_misses = 3;
+  // Then nodes larger than this part of the root's surface are re-inserted: those inside subtrees
+  // there, and those above them once subtrees are known.
+  int reinsert_rounds = 6;
+  float reinsert_area = 0.003f;
 };
 
 struct TopRange {

@@ -95,7 +95,7 @@ class Widener {
     const std::uint64_t used = std::max<std::uint64_t>(subtrees_[0].units, kNodeUnits + 1);
     if (used + kSpareUnits > kernels::kMaxWideUnits) return;
     nothing_ = kernels::kLeafRef | static_cast<std::uint32_t>(used);
-    to_.units = util::HugeArray<WideUnit>(used + kSpareUnits);
+    to_.units = util::HugeArray<WideUnit>(used + kSpareUnits, util::kHugePage);
     std::uint32_t next = kNodeUnits;
     Children children;
     gather(from_.nodes[0], children);

@@ -15,9 +15,10 @@ class HugeArray {
 
  public:
   HugeArray() = default;
-  // The caller has made sure that the size in bytes fits.
-  explicit HugeArray(std::size_t size)
-      : data_(size == 0 ? nullptr : static_cast<T*>(map_huge(size * sizeof(T)))), size_(size) {}
+  // The caller has made sure that the size in bytes fits. `least`: as map_huge() has it.
+  explicit HugeArray(std::size_t size, std::size_t least = kLeastInHugePages)
+      : data_(size == 0 ? nullptr : static_cast<T*>(map_huge(size * sizeof(T), least))),
+        size_(size) {}
   HugeArray(HugeArray&& other) noexcept
       : data_(std::exchange(other.data_, nullptr)), size_(std::exchange(other.size_, 0)) {}
   HugeArray& operator=(HugeArray&& other) noexcept {

@@ -11,9 +11,6 @@ namespace octrace::util {
 namespace {
 
 constexpr std::size_t kSmallPage = 4096;
-// The system often has small pages at hand and must find or clear large ones: framebuffers of 4 MB
-// in large pages made a job of ten views a tenth slower.
-constexpr std::size_t kLeastInHugePages = std::size_t{8} << 20;
 
 // A rest of half a huge page and more takes a whole one; small arrays do not take 2 MiB.
 std::size_t in_huge_pages(std::size_t bytes) {
@@ -25,7 +22,7 @@ std::size_t mapped_bytes(std::size_t bytes) {
 
 }  // namespace
 
-void* map_huge(std::size_t bytes) {
+void* map_huge(std::size_t bytes, std::size_t least) {
   if (bytes > SIZE_MAX / 2) throw std::bad_alloc();
   const std::size_t used = mapped_bytes(bytes);
   void* const memory =
@@ -38,7 +35,7 @@ void* map_huge(std::size_t bytes) {
   // What alignment does not need goes back, so that the size alone says what to unmap.
   if (before != 0) munmap(begin, before);
   munmap(aligned + used, kHugePage - before);
-  if (bytes >= kLeastInHugePages) madvise(aligned, in_huge_pages(bytes), MADV_HUGEPAGE);
+  if (bytes >= least) madvise(aligned, in_huge_pages(bytes), MADV_HUGEPAGE);
   return aligned;
 }
 

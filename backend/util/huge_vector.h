@@ -1,4 +1,4 @@
-// A std::vector that is on huge pages from 8 MiB on, and whose new elements are left as they are:
+// A std::vector that is on huge pages from one of them on, and whose new elements are left as they are:
 // threads that fill a large array touch its pages first, each its own.
 #pragma once
 
@@ -27,7 +27,7 @@ struct HugeAllocator {
     if (size > std::numeric_limits<std::size_t>::max() / sizeof(T)) throw std::bad_alloc();
     const std::size_t bytes = size * sizeof(T);
     return static_cast<T*>(bytes < kHugePage ? ::operator new (bytes, std::align_val_t{alignof(T)})
-                                             : map_huge(bytes));
+                                             : map_huge(bytes, kHugePage));
   }
   void deallocate(T* memory, std::size_t size) noexcept {
     const std::size_t bytes = size * sizeof(T);
