@@ -21,6 +21,7 @@ using octree::Octree;
 Octree build(const Mesh& mesh, Builder builder) {
   octree::BuildOptions options;
   options.builder = builder;
+  options.cuts = false;  // as for scenes that are refitted: a refit makes parts whole
   util::Result<Octree> octree = octree::build(mesh.input(), options);
   EXPECT_TRUE(octree);
   return std::move(*octree);
