@@ -13,6 +13,7 @@
 #include <atomic>
 #include <cstring>
 #include <functional>
+#include <numeric>
 #include <unordered_set>
 #include <utility>
 
@@ -143,27 +144,27 @@ class TopWriter {
         chunks_(chunks),
         input_(input),
         octree_(octree),
-        sizes_(top.size()) {}
+        sizes_(top.size()),
+        jobs_(chunks.size()) {}
 
-  bool run() {
+  // `order`: in which subtrees were built, so that their memory is given back while that of the
+  // octree is taken.
+  bool run(const std::vector<std::uint32_t>& order) {
     if (measure(BinaryTree::kRoot, 1) > kernels::kMaxDepth) return false;
     place(BinaryTree::kRoot, 0, 1);
     spread_triangles();
     octree_.nodes.resize(sizes_[BinaryTree::kRoot]);
-    // As they were built, so that their memory is given back while that of the octree is taken.
-    std::sort(jobs_.begin(), jobs_.end(),
-              [](const Job& a, const Job& b) { return a.subtree < b.subtree; });
-    tbb::parallel_for(std::size_t{0}, jobs_.size(), [&](std::size_t i) { copy(jobs_[i]); });
+    tbb::parallel_for(std::size_t{0}, order.size(), [&](std::size_t i) { copy(order[i]); });
     for (const auto& [at, node] : top_) octree_.nodes[at] = node;
-    for (const Job& job : jobs_) octree_.nodes[job.root] = job.node;
+    for (const Job& job : jobs_) octree_.nodes[job.at] = job.root;
     return true;
   }
 
  private:
   // Where a subtree goes: its root, and what is below that.
   struct Job {
-    std::uint32_t subtree, root, below;
-    kernels::Node node{};  // the root, once the rest is there
+    std::uint32_t at = 0, below = 0;
+    kernels::Node root{};  // once the rest is there
   };
 
   // Counts the eight-way nodes. Returns the depth of the lowest.
@@ -188,7 +189,7 @@ class TopWriter {
   // page of memory before its time.
   void place(std::uint32_t index, std::uint32_t at, std::uint32_t below) {
     if (nodes_[index].leaf()) {
-      jobs_.push_back({nodes_[index].triangle(), at, below});
+      jobs_[nodes_[index].triangle()] = {at, below};
       return;
     }
     const Family family(nodes_, index);
@@ -205,10 +206,11 @@ class TopWriter {
     }
   }
 
-  void copy(Job& job) {
-    Chunk& chunk = chunks_[job.subtree];
-    copy_subtree(chunk.nodes, chunk.size, octree_.nodes.data(), job.node,
-                 {job.below, subtrees_[job.subtree]->place});
+  void copy(std::uint32_t subtree) {
+    Job& job = jobs_[subtree];
+    Chunk& chunk = chunks_[subtree];
+    copy_subtree(chunk.nodes, chunk.size, octree_.nodes.data(), job.root,
+                 {job.below, subtrees_[subtree]->place});
     chunk.block.reset();
   }
 
@@ -235,7 +237,7 @@ class TopWriter {
   const BuildInput& input_;
   Octree& octree_;
   std::vector<std::uint32_t> sizes_;  // by binary node: eight-way nodes of its subtree
-  std::vector<Job> jobs_;
+  std::vector<Job> jobs_;             // by subtree
   std::vector<std::pair<std::uint32_t, kernels::Node>> top_;  // nodes above subtrees, by place
 };
 
@@ -269,11 +271,26 @@ std::size_t block_nodes(std::uint32_t references, std::uint32_t most) {
   return std::max(expected >= kLarge ? kLarge : 0, 2 * std::size_t{most});
 }
 
-bool build_all(const TopNodes& top, const Subtrees& all, std::vector<Chunk>& chunks,
-               std::vector<float>& costs) {
+// The order in which subtrees are built: the largest first, lest a thread begins one when the
+// others are done.
+std::vector<std::uint32_t> building_order(const TopNodes& top) {
+  std::vector<std::uint32_t> order(top.leaves().size());
+  std::iota(order.begin(), order.end(), 0u);
+  if (tbb::this_task_arena::max_concurrency() > 1) {
+    std::stable_sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
+      return top.leaves()[a]->size > top.leaves()[b]->size;
+    });
+  }
+  return order;
+}
+
+bool build_all(const TopNodes& top, const Subtrees& all, const std::vector<std::uint32_t>& order,
+               std::vector<Chunk>& chunks, std::vector<float>& costs) {
   std::atomic<bool> built{true};
+  std::atomic<std::size_t> next{0};
   tbb::enumerable_thread_specific<Workplace> workplaces(std::cref(all));
-  tbb::parallel_for(std::size_t{0}, chunks.size(), [&](std::size_t i) {
+  tbb::parallel_for(std::size_t{0}, order.size(), [&](std::size_t) {
+    const std::uint32_t i = order[next++];
     if (!workplaces.local().build(*top.leaves()[i], chunks[i], costs[i])) built = false;
   });
   return built;
@@ -297,9 +314,11 @@ bool build_subtrees(const TopTree& top, const TopOptions& options, std::uint32_t
                      most,           block_nodes(top.root->size, most)};
   std::vector<Chunk> chunks(nodes.leaves().size());
   std::vector<float> costs(chunks.size());
-  if (!build_all(nodes, all, chunks, costs)) return false;
+  const std::vector<std::uint32_t> order = building_order(nodes);
+  if (!build_all(nodes, all, order, chunks, costs)) return false;
   reinsert(nodes.nodes(), nodes.size(), reinsertion);
-  return plan_top(nodes.nodes(), costs.data()) && TopWriter(nodes, chunks, input, octree).run();
+  return plan_top(nodes.nodes(), costs.data()) &&
+         TopWriter(nodes, chunks, input, octree).run(order);
 }
 
 }  // namespace octrace::octree

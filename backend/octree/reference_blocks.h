@@ -11,7 +11,7 @@
 namespace octrace::octree {
 
 inline constexpr std::uint32_t kBlock = 4096;
-inline constexpr std::uint32_t kParallel = 4 * kBlock;  // references worth a task
+inline constexpr std::uint32_t kParallel = 2 * kBlock;  // references worth a task
 
 inline std::uint32_t blocks_of(std::uint32_t count) { return (count + kBlock - 1) / kBlock; }
 
