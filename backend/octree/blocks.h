@@ -1,4 +1,4 @@
-// Memory for a thread's arrays that live until all threads are done.
+// Memory for a thread's arrays, which others need later.
 #pragma once
 
 #include <algorithm>
@@ -9,22 +9,22 @@
 
 namespace octrace::octree {
 
-// Arrays in blocks, which last as long as there is an array in them.
+// Arrays in blocks, which last as long as somebody keeps an array in them.
 template <class T>
 class Blocks {
  public:
   using Block = std::shared_ptr<util::HugeArray<T>>;
 
-  // `size`: of blocks; no array may be larger.
+  // `size`: of blocks; a larger array has one of its own.
   explicit Blocks(std::size_t size) : size_(size) {}
 
   // Room for as many as may come, of which use() then keeps those that came.
   T* reserve(std::size_t most) {
     if (free_ < most) {
-      block_ = std::make_shared<util::HugeArray<T>>(size_, util::kHugePage);
-      free_ = size_;
+      free_ = std::max(size_, most);
+      block_ = std::make_shared<util::HugeArray<T>>(free_, util::kHugePage);
     }
-    return block_->data() + (size_ - free_);
+    return block_->data() + (block_->size() - free_);
   }
   // Returns what keeps them.
   Block use(std::size_t count) {

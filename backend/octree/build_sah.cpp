@@ -1,6 +1,6 @@
 // The SAH builders. `sah`: the top of a binary tree with cuts (top_tree.h), subtrees in cache below
-// (build_subtrees.h), with re-insertion (reinsert.h) of what is large. `quality`: a whole binary tree
-// with more cuts (build_binary.h), more of it re-inserted, collapsed into eight-way nodes
+// (build_subtrees.h), with re-insertion (reinsert.h) of what is large. `quality`: a whole binary
+// tree with more cuts (build_binary.h), more of it re-inserted, collapsed into eight-way nodes
 // (collapse.h).
 #include <algorithm>
 #include <stdexcept>
@@ -35,6 +35,7 @@ ReinsertOptions reinsert_options(const BinaryTree& tree) {
   options.rounds = 10;
   const std::uint32_t references = tree.nodes[BinaryTree::kRoot].plan;
   options.most = std::max(references / 5, 1u);  // a tenth of the nodes
+  options.steps = 4096;
   return options;
 }
 
@@ -51,18 +52,19 @@ bool build_fast(const BuildInput& input, const TopOptions& options, std::uint32_
   return build_subtrees(top, options, leaf_triangles, input, references, octree);
 }
 
-bool build_quality(const BuildInput& input, bool cuts, std::uint32_t leaf_triangles,
+bool build_quality(const BuildInput& input, const SahOptions& options, bool reinserts,
                    Octree& octree) {
-  BinaryOptions options = quality_options();
-  if (!cuts) options.duplicates = 0.0f;
-  BinaryTree tree = build_binary(input, options);
-  reinsert(tree.nodes.data(), tree.nodes.size(), reinsert_options(tree));
-  return collapse(tree, leaf_triangles, input, octree);
+  BinaryOptions binary = quality_options();
+  if (!options.cuts) binary.duplicates = 0.0f;
+  BinaryTree tree = build_binary(input, binary);
+  if (reinserts) reinsert(tree.nodes.data(), tree.nodes.size(), reinsert_options(tree));
+  return collapse(tree, options.leaf_triangles, input, octree);
 }
 
-TopOptions fast_options(bool cuts) {
+TopOptions fast_options(bool cuts, bool reinserts) {
   TopOptions options;
   if (!cuts) options.duplicates = 0.0f;
+  if (!reinserts) options.reinsert_rounds = 0;
   return options;
 }
 
@@ -70,18 +72,20 @@ TopOptions fast_options(bool cuts) {
 
 void build_sah(const BuildInput& input, const SahOptions& options, Octree& octree) {
   if (input.triangles.empty()) return;
-  if (options.quality
-          ? build_quality(input, options.cuts, options.leaf_triangles, octree)
-          : build_fast(input, fast_options(options.cuts), options.leaf_triangles, octree)) {
-    const auto triangles = static_cast<double>(input.triangles.size());
-    octree.cut = static_cast<double>(octree.triangles.size()) > triangles * (1.0 + kManyCuts);
-    return;
+  // Re-insertion may make a tree too deep.
+  for (const bool reinserts : {true, false}) {
+    if (options.quality ? build_quality(input, options, reinserts, octree)
+                        : build_fast(input, fast_options(options.cuts, reinserts),
+                                     options.leaf_triangles, octree)) {
+      const auto triangles = static_cast<double>(input.triangles.size());
+      octree.cut = static_cast<double>(octree.triangles.size()) > triangles * (1.0 + kManyCuts);
+      return;
+    }
   }
-  // Too deep: halves of fewer than 2^31 references by rank are at most 31 binary levels, and there
-  // are no more eight-way ones.
-  TopOptions plain = fast_options(false);
+  // Too deep as it is: halves of fewer than 2^31 references by rank are at most 31 binary levels,
+  // and there are no more eight-way ones.
+  TopOptions plain = fast_options(false, false);
   plain.sah_depth = 0;
-  plain.reinsert_rounds = 0;
   if (!build_fast(input, plain, options.leaf_triangles, octree)) {
     throw std::logic_error("an octree of halves by rank is too deep");
   }
@@ -96,7 +100,7 @@ std::uint64_t sah_build_bytes(std::uint64_t triangles, const SahOptions& options
     // Parts of triangles are listed, in vectors that may have twice the room, and their leaf
     // triangles wait for their places.
     constexpr double kPart = 2 * sizeof(LooseReference) + sizeof(kernels::LeafTriangle);
-    const double parts = count * double{fast_options(options.cuts).duplicates};
+    const double parts = count * double{fast_options(options.cuts, true).duplicates};
     return static_cast<std::uint64_t>(
         (count + parts) * (sizeof(LooseReference) + 2 * nodes * sizeof(kernels::Node)) +
         parts * kPart);

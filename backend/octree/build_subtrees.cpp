@@ -47,7 +47,7 @@ struct Subtrees {
   const LooseReference* references;
   kernels::LeafTriangle* triangles;
   std::uint32_t most;       // references of a subtree
-  std::size_t block_nodes;  // for those of several subtrees
+  std::size_t block_nodes;  // of memory for the nodes of several subtrees
 };
 
 class Workplace {
@@ -56,33 +56,43 @@ class Workplace {
       : all_(all),
         nodes_(std::make_unique_for_overwrite<BinaryNode[]>(2 * std::size_t{all.most})),
         local_(std::make_unique_for_overwrite<LocalTriangle[]>(all.most)),
+        wide_(std::make_unique_for_overwrite<kernels::Node[]>(all.most)),
         written_(all.block_nodes) {}
 
   // Finds the subtree's cost in one slot as well. False: it is too deep.
   bool build(const TopRange& range, Chunk& chunk, float& cost) {
-    room_.build(range, all_.options, all_.references, nodes_.get(), local_.get());
-    reinsert(nodes_.get(), 2 * std::size_t{range.size}, all_.reinsert);
-    if (!plan_subtree(nodes_.get(), all_.leaf_triangles, cost)) return false;
-    // Every node but a subtree's root has two children or more, so there are not more of them.
-    kernels::Node* const to = written_.reserve(range.size);
-    NodeWriter::Place place{1, 0};
-    kernels::LeafTriangle* const own = all_.triangles + range.first;
     const std::uint32_t rest = range.size - range.count;
+    kernels::LeafTriangle* const own = all_.triangles + range.first;
     kernels::LeafTriangle* const leaves = rest == 0 ? own : more_triangles();
-    chunk.height = NodeWriter(nodes_.get(), all_.input, local_.get(), to, leaves)
+    if (!plan(range, cost)) return false;
+    NodeWriter::Place place{1, 0};
+    chunk.height = NodeWriter(nodes_.get(), all_.input, local_.get(), wide_.get(), leaves)
                        .write_all(BinaryTree::kRoot, 0, place);
     if (leaves != own) {
       std::copy_n(leaves, range.count, own);
       chunk.rest = std::make_unique_for_overwrite<kernels::LeafTriangle[]>(rest);
       std::copy_n(leaves + range.count, rest, chunk.rest.get());
     }
-    chunk.nodes = to;
+    kernels::Node* const nodes = written_.reserve(place.node);
+    std::copy_n(wide_.get(), place.node, nodes);
+    chunk.nodes = nodes;
     chunk.size = place.node;
     chunk.block = written_.use(place.node);
     return true;
   }
 
  private:
+  // Re-insertion makes chains of some fans and stacks, which are better left as they were split.
+  bool plan(const TopRange& range, float& cost) {
+    constexpr int kMostReinserted = 48;  // binary levels; splits make 13 to 30 of real scenes
+    room_.build(range, all_.options, all_.references, nodes_.get(), local_.get());
+    if (reinsert(nodes_.get(), 2 * std::size_t{range.size}, all_.reinsert)) {
+      if (plan_subtree(nodes_.get(), all_.leaf_triangles, kMostReinserted, cost)) return true;
+      room_.build(range, all_.options, all_.references, nodes_.get(), local_.get());
+    }
+    return plan_subtree(nodes_.get(), all_.leaf_triangles, kMostBinaryLevels, cost);
+  }
+
   kernels::LeafTriangle* more_triangles() {
     if (!triangles_) {
       triangles_ = std::make_unique_for_overwrite<kernels::LeafTriangle[]>(all_.most);
@@ -94,6 +104,7 @@ class Workplace {
   SubtreeRoom room_;
   std::unique_ptr<BinaryNode[]> nodes_;
   std::unique_ptr<LocalTriangle[]> local_;
+  std::unique_ptr<kernels::Node[]> wide_;  // until their number is known
   std::unique_ptr<kernels::LeafTriangle[]> triangles_;
   Blocks<kernels::Node> written_;
 };
@@ -264,23 +275,25 @@ TopNodes choose_subtrees(const TopTree& top, std::uint32_t most) {
 
 // Blocks of a large page each, where every thread fills one; smaller ones where those would stay
 // empty.
-std::size_t block_nodes(std::uint32_t references, std::uint32_t most) {
-  constexpr std::size_t kLarge = util::kHugePage / sizeof(kernels::Node) + 1;
+std::size_t block_nodes(std::uint32_t references) {
+  constexpr std::size_t kSmall = 2048, kLarge = util::kHugePage / sizeof(kernels::Node) + 1;
   const auto threads = static_cast<std::uint32_t>(tbb::this_task_arena::max_concurrency());
-  const std::size_t expected = std::size_t{references} / threads / 8;  // measured
-  return std::max(expected >= kLarge ? kLarge : 0, 2 * std::size_t{most});
+  const std::size_t expected = references / threads / 8;  // measured
+  return expected >= kLarge ? kLarge : kSmall;
 }
 
-// The order in which subtrees are built: the largest first, lest a thread begins one when the
-// others are done.
-std::vector<std::uint32_t> building_order(const TopNodes& top) {
+// The order in which subtrees are built: as they lie in memory, but the largest first where threads
+// have few each, lest one begins such a one when the others are done.
+std::vector<std::uint32_t> building_order(const TopNodes& top, std::uint32_t references) {
+  const auto threads = static_cast<std::uint32_t>(tbb::this_task_arena::max_concurrency());
+  const std::uint32_t large = references / threads / 8;
+  const auto size = [&](std::uint32_t i) { return top.leaves()[i]->size; };
   std::vector<std::uint32_t> order(top.leaves().size());
   std::iota(order.begin(), order.end(), 0u);
-  if (tbb::this_task_arena::max_concurrency() > 1) {
-    std::stable_sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
-      return top.leaves()[a]->size > top.leaves()[b]->size;
-    });
-  }
+  const auto rest = std::stable_partition(order.begin(), order.end(),
+                                          [&](std::uint32_t i) { return size(i) > large; });
+  std::stable_sort(order.begin(), rest,
+                   [&](std::uint32_t a, std::uint32_t b) { return size(a) > size(b); });
   return order;
 }
 
@@ -300,9 +313,11 @@ bool build_all(const TopNodes& top, const Subtrees& all, const std::vector<std::
 
 bool build_subtrees(const TopTree& top, const TopOptions& options, std::uint32_t leaf_triangles,
                     const BuildInput& input, const LooseReference* references, Octree& octree) {
-  ReinsertOptions reinsertion;
-  reinsertion.rounds = options.reinsert_rounds;
-  ReinsertOptions in_subtrees = reinsertion;
+  ReinsertOptions above, in_subtrees;
+  above.rounds = in_subtrees.rounds = options.reinsert_rounds;
+  above.steps = in_subtrees.steps = options.reinsert_steps;
+  above.most = options.reinsert_most_above;
+  in_subtrees.most = options.reinsert_most;
   in_subtrees.least_area = options.reinsert_area * top.root->bounds.half_area();
   in_subtrees.parallel = false;
   // Enough subtrees for many threads, which need room for one each.
@@ -311,12 +326,12 @@ bool build_subtrees(const TopTree& top, const TopOptions& options, std::uint32_t
   const Subtrees all{options,        in_subtrees,
                      leaf_triangles, input,
                      references,     octree.triangles.data(),
-                     most,           block_nodes(top.root->size, most)};
+                     most,           block_nodes(top.root->size)};
   std::vector<Chunk> chunks(nodes.leaves().size());
   std::vector<float> costs(chunks.size());
-  const std::vector<std::uint32_t> order = building_order(nodes);
+  const std::vector<std::uint32_t> order = building_order(nodes, top.root->size);
   if (!build_all(nodes, all, order, chunks, costs)) return false;
-  reinsert(nodes.nodes(), nodes.size(), reinsertion);
+  reinsert(nodes.nodes(), nodes.size(), above);
   return plan_top(nodes.nodes(), costs.data()) &&
          TopWriter(nodes, chunks, input, octree).run(order);
 }

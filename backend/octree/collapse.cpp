@@ -147,11 +147,13 @@ class Writer {
     }
   }
 
-  void copy(const Job& job) {
+  // Gives the draft's memory back.
+  void copy(Job& job) {
     copy_subtree(job.draft.nodes, job.size.nodes, octree_.nodes.data(), octree_.nodes[job.root],
                  job.place);
     write_triangles(input_, job.draft.triangles, job.size.triangles,
                     octree_.triangles.data() + job.place.triangle);
+    job.draft = {};
   }
 
   BinaryTree& tree_;

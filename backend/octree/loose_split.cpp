@@ -41,7 +41,8 @@ HWY_ATTR std::uint32_t find_misplaced(LooseReference* references, std::uint32_t 
   TwoBounds both;
   std::uint32_t found = 0;
   for (std::uint32_t i = 0; i < count; ++i) {
-    __builtin_prefetch(references + i + kAhead);  // the processor's own guess ends with a page
+    // The processor's own guess ends with a page.
+    __builtin_prefetch(references + std::min(i + kAhead, count - 1));
     const float position = plane.position(references[i]);
     references[found].note = i;
     found += (position < plane.first_upper) == on_upper_side;

@@ -28,8 +28,8 @@ HWY_ATTR HWY_INLINE void clear(ObjectBins& bins, int count) {
 
 // The bins of a few references first and then the boxes, so that the processor knows all addresses
 // by the time it loads from them: references of one bin often follow each other.
-// Every other one goes to `others`, which may be the same bins: where they are not, a reference does
-// not wait for what the one before, of the same bin, has stored.
+// Every other one goes to `others`, which may be the same bins: where they are not, a reference
+// does not wait for what the one before, of the same bin, has stored.
 template <class R>
 HWY_ATTR HWY_INLINE void fill_bins(const R* references, std::uint32_t count, const Binning& binning,
                                    ObjectBins& bins, ObjectBins& others) {

@@ -26,8 +26,6 @@ constexpr std::uint32_t kParallel = 4096;  // references worth a task
 // Of subtrees of 512 to 4096 triangles of sponza: what they cost less in 1 to 8 slots than in one,
 // as part of what they do in eight, which is their surface times kNodeCost.
 constexpr float kSpared[kChildren] = {0.0f, 0.3f, 0.5f, 0.65f, 0.75f, 0.85f, 0.93f, 1.0f};
-// Reinsertion may deepen the tree; no tree of use comes near this.
-constexpr int kMaxBinaryDepth = 1000;
 
 // The least cost of a subtree in at most 1 to 8 slots, in words 8 to 15; words 0 to 7 are infinite,
 // so that eight costs can be read at an offset.
@@ -42,8 +40,14 @@ enum class Leaf { triangle, subtree, guess };
 class Planner {
  public:
   // `costs`: of subtrees.
-  Planner(BinaryNode* nodes, Leaf kind, std::uint32_t leaf, const float* costs, bool parallel)
-      : nodes_(nodes), kind_(kind), leaf_(leaf), costs_(costs), parallel_(parallel) {}
+  Planner(BinaryNode* nodes, Leaf kind, std::uint32_t leaf, const float* costs, int most_levels,
+          bool parallel)
+      : nodes_(nodes),
+        kind_(kind),
+        leaf_(leaf),
+        costs_(costs),
+        most_levels_(most_levels),
+        parallel_(parallel) {}
 
   HWY_ATTR bool run(float& cost) {
     Costs costs;
@@ -81,7 +85,7 @@ class Planner {
   }
 
   HWY_ATTR HWY_NOINLINE void plan_inner(BinaryNode& node, int depth, Costs& costs) {
-    if (depth == kMaxBinaryDepth) {
+    if (depth == most_levels_) {
       too_deep_ = true;
       store(eight(0.0f), costs.word + 8);
       costs.references = 1;
@@ -153,18 +157,21 @@ class Planner {
   const Leaf kind_;
   const std::uint32_t leaf_;
   const float* const costs_;
+  const int most_levels_;
   const bool parallel_;
   std::atomic<bool> too_deep_{false};
 };
 
-HWY_ATTR bool plan_triangles(BinaryNode* nodes, std::uint32_t leaf_triangles, bool parallel,
-                             float& cost) {
-  return Planner(nodes, Leaf::triangle, leaf_triangles, nullptr, parallel).run(cost);
+HWY_ATTR bool plan_triangles(BinaryNode* nodes, std::uint32_t leaf_triangles, int most_levels,
+                             bool parallel, float& cost) {
+  return Planner(nodes, Leaf::triangle, leaf_triangles, nullptr, most_levels, parallel).run(cost);
 }
 
 HWY_ATTR bool plan_subtrees(BinaryNode* nodes, const float* costs) {
   float cost;
-  return Planner(nodes, costs != nullptr ? Leaf::subtree : Leaf::guess, 0, costs, false).run(cost);
+  return Planner(nodes, costs != nullptr ? Leaf::subtree : Leaf::guess, 0, costs, kMostBinaryLevels,
+                 false)
+      .run(cost);
 }
 
 }  // namespace octrace::octree::HWY_NAMESPACE
@@ -178,18 +185,18 @@ HWY_EXPORT(plan_subtrees);
 
 bool plan(BinaryNode* nodes, std::uint32_t leaf_triangles) {
   float cost;
-  return HWY_DYNAMIC_DISPATCH(plan_triangles)(nodes, leaf_triangles, true, cost);
+  return HWY_DYNAMIC_DISPATCH(plan_triangles)(nodes, leaf_triangles, kMostBinaryLevels, true, cost);
 }
 
-bool plan_subtree(BinaryNode* nodes, std::uint32_t leaf_triangles, float& cost) {
-  return HWY_DYNAMIC_DISPATCH(plan_triangles)(nodes, leaf_triangles, false, cost);
+bool plan_subtree(BinaryNode* nodes, std::uint32_t leaf_triangles, int most_levels, float& cost) {
+  return HWY_DYNAMIC_DISPATCH(plan_triangles)(nodes, leaf_triangles, most_levels, false, cost);
 }
 
 bool plan_top(BinaryNode* nodes, const float* costs) {
   return HWY_DYNAMIC_DISPATCH(plan_subtrees)(nodes, costs);
 }
 
-bool guess_top(BinaryNode* nodes) { return HWY_DYNAMIC_DISPATCH(plan_subtrees)(nodes, nullptr); }
+void guess_top(BinaryNode* nodes) { HWY_DYNAMIC_DISPATCH(plan_subtrees)(nodes, nullptr); }
 
 }  // namespace octrace::octree
 #endif

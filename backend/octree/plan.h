@@ -19,14 +19,18 @@ inline std::uint32_t about_count(std::uint32_t plan) { return 1u << (plan >> 27)
 // In one slot, the subtree of a planned node is a leaf.
 inline bool is_leaf(const BinaryNode& node) { return (node.plan & kLeafPlan) != 0; }
 
+// Reinsertion may deepen the tree; no tree of use comes near this.
+inline constexpr int kMostBinaryLevels = 1000;
+
 // Overwrites the plans of the tree whose root is nodes[kRoot]. False: it is too deep to be of use.
 bool plan(BinaryNode* nodes, std::uint32_t leaf_triangles);
-// The same for a small tree, which one thread takes. Finds its cost in one slot.
-bool plan_subtree(BinaryNode* nodes, std::uint32_t leaf_triangles, float& cost);
+// The same for a small tree of so many levels at most, which one thread takes. Finds its cost in
+// one slot.
+bool plan_subtree(BinaryNode* nodes, std::uint32_t leaf_triangles, int most_levels, float& cost);
 // The same where leaf i stands for a subtree that takes one slot at cost costs[i].
 bool plan_top(BinaryNode* nodes, const float* costs);
 // The same where leaves stand for subtrees that are not built yet: what they cost more or less in
-// any number of slots is guessed from their surface.
-bool guess_top(BinaryNode* nodes);
+// any number of slots is guessed from their surface. Only for trees that are not too deep.
+void guess_top(BinaryNode* nodes);
 
 }  // namespace octrace::octree

@@ -29,38 +29,38 @@ struct Move {
 
 class Reinserter {
  public:
-  Reinserter(BinaryNode* nodes, std::size_t size, bool parallel)
+  Reinserter(BinaryNode* nodes, std::size_t size)
       : nodes_(nodes),
         parents_(std::make_unique_for_overwrite<Index[]>(size)),
-        parallel_(parallel),
         touched_(size, false) {
     parents_[kRoot] = 0;
   }
 
-  void run(const ReinsertOptions& options) {
+  bool run(const ReinsertOptions& options) {
     std::vector<Index> candidates = largest(options.most, options.least_area);
     float first_gain = 0.0f;
     for (int i = 0; i < options.rounds && !candidates.empty(); ++i) {
-      const float gain = round(candidates);
+      const float gain = round(candidates, options);
       if (i == 0) first_gain = gain;
-      if (!(gain > options.last_gain * first_gain)) return;
+      if (!(gain > options.last_gain * first_gain)) break;
     }
+    return first_gain > 0.0f;
   }
 
  private:
   // Moves what can be moved, and leaves in `candidates` those worth another look: moves that stood
   // in each other's way, and the nodes about those that were made. Returns by how much the sum of
   // surfaces fell.
-  float round(std::vector<Index>& candidates) {
+  float round(std::vector<Index>& candidates, const ReinsertOptions& options) {
     std::vector<Move> moves(candidates.size());
     const auto search_all = [&](const auto& range) {
       Search search;
       for (std::size_t i = range.begin(); i < range.end(); ++i) {
-        moves[i] = find(candidates[i], search);
+        moves[i] = find(candidates[i], options.steps, search);
       }
     };
     const tbb::blocked_range<std::size_t> all_candidates(0, candidates.size(), 16);
-    if (parallel_) {
+    if (options.parallel) {
       tbb::parallel_for(all_candidates, search_all);
     } else {
       search_all(all_candidates);
@@ -141,7 +141,7 @@ class Reinserter {
   };
 
   // Branch and bound from the node's sibling up to the root and down each way.
-  Move find(Index from, Search& search) const {
+  Move find(Index from, std::size_t steps, Search& search) const {
     std::vector<Step>& stack = search.stack;
     std::vector<Step>& seen = search.seen;
     seen.clear();
@@ -159,6 +159,10 @@ class Reinserter {
         const Step step = stack.back();
         stack.pop_back();
         if (step.gain - area <= best.gain) continue;
+        if (seen.size() >= steps) {
+          stack.clear();
+          break;
+        }
         const auto here = static_cast<Index>(seen.size());
         seen.push_back(step);
         const BinaryNode& to = nodes_[step.index];
@@ -182,7 +186,7 @@ class Reinserter {
         }
         gain_here += nodes_[pivot].half_area() - without.half_area();
       }
-      if (pivot == kRoot) break;
+      if (pivot == kRoot || seen.size() >= steps) break;
       sibling = pivot ^ 1u;
       pivot = parents_[pivot];
     }
@@ -232,16 +236,16 @@ class Reinserter {
 
   BinaryNode* nodes_;
   std::unique_ptr<Index[]> parents_;
-  const bool parallel_;
   std::vector<bool> touched_;  // by moves of this round
   std::vector<Index> touched_list_;
 };
 
 }  // namespace
 
-void reinsert(BinaryNode* nodes, std::size_t size, const ReinsertOptions& options) {
-  if (options.rounds == 0 || nodes[kRoot].leaf()) return;
-  Reinserter(nodes, size, options.parallel).run(options);
+bool reinsert(BinaryNode* nodes, std::size_t size, const ReinsertOptions& options) {
+  if (options.rounds == 0 || nodes[kRoot].leaf()) return false;
+  if (!(nodes[kRoot].half_area() > options.least_area)) return false;
+  return Reinserter(nodes, size).run(options);
 }
 
 }  // namespace octrace::octree

@@ -255,7 +255,8 @@ void SubtreeRoom::build_unit(const Work& work, const TopRange& unit, std::uint32
   std::for_each(unit.parts.begin(), unit.parts.end(), name);
   for (std::uint32_t i = 0; i < unit.size; ++i) references_[i].triangle = first + i;
   splitter_.subtree({references_.get(), spare_.get(), unit.size, unit.bounds, work.nodes, first + 1,
-                     root, work.options.unit_bins, std::max(work.options.sah_depth - unit.depth, 0)});
+                     root, work.options.unit_bins,
+                     std::max(work.options.sah_depth - unit.depth, 0)});
 }
 
 }  // namespace octrace::octree

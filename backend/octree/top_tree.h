@@ -28,10 +28,13 @@ struct TopOptions {
   float least_overlap = 0.01f;
   float duplicates = 0.1f;  // 0: no cuts
   int spatial_misses = 3;
-  // Then nodes larger than this part of the root's surface are re-inserted: those inside subtrees
-  // there, and those above them once subtrees are known.
+  // Re-insertion (reinsert.h): in each subtree of so many nodes, those of the largest surfaces, if
+  // they are larger than this part of the root's; then of those above the subtrees.
   int reinsert_rounds = 6;
   float reinsert_area = 0.003f;
+  std::uint32_t reinsert_most = 256;  // in a subtree
+  std::uint32_t reinsert_most_above = 4096;
+  std::uint32_t reinsert_steps = 256;  // of one search
 };
 
 struct TopRange {

@@ -1,5 +1,5 @@
-// A std::vector that is on huge pages from one of them on, and whose new elements are left as they are:
-// threads that fill a large array touch its pages first, each its own.
+// A std::vector that is on huge pages from one of them on, and whose new elements are left as they
+// are: threads that fill a large array touch its pages first, each its own.
 #pragma once
 
 #include <cstddef>
