@@ -13,6 +13,7 @@
 #include <optional>
 
 #include "backend/gltf/issues.h"
+#include "backend/util/heap.h"
 
 namespace octrace::gltf {
 namespace {
@@ -49,6 +50,9 @@ bool is_below(const std::string& path, const std::string& folder) {
   return path.size() > folder.size() && path.starts_with(folder) && path[folder.size()] == '/';
 }
 
+constexpr std::uint64_t kLargeFile = 1u << 20;
+constexpr std::uint64_t kMostPrepared = 31u << 20;  // larger blocks are not of the heap
+
 util::Result<Bytes> read_open(const Descriptor& file, std::uint64_t max_bytes,
                               std::uint64_t wanted) {
   struct stat status {};
@@ -61,7 +65,11 @@ util::Result<Bytes> read_open(const Descriptor& file, std::uint64_t max_bytes,
         util::Exit::limit, "LIMIT",
         fmt::format("the file has {} bytes, --max-file-bytes allows {}", size, max_bytes), "", ""};
   }
-  Bytes bytes(std::min(size, wanted));
+  const std::uint64_t count = std::min(size, wanted);
+  // What is made of a large file takes several times its size, most of it in pieces that the heap
+  // would grow for by small pages: their faults took most of the time to load a scene.
+  if (count >= kLargeFile) util::prepare_heap(std::min(6 * count, kMostPrepared));
+  Bytes bytes(count);
   std::size_t done = 0;
   while (done < bytes.size()) {
     const ssize_t got = ::read(file.get(), bytes.data() + done, bytes.size() - done);

@@ -128,7 +128,7 @@ constexpr std::size_t kLibraryHeap = std::size_t{28} << 20;
 void preload() {
   preload_begun = true;
   std::thread([] {
-    util::prepare_thread_heap(kLibraryHeap);
+    util::prepare_heap(kLibraryHeap);
     module();
   }).detach();
 }

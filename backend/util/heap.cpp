@@ -16,8 +16,9 @@ void keep_freed_memory() {
 #endif
 }
 
-void prepare_thread_heap(std::size_t bytes) {
+void prepare_heap(std::size_t bytes) {
   void* const block = std::malloc(bytes);
+  if (block == nullptr) return;
   prefer_huge_pages(block, bytes);
   std::free(block);
 }

@@ -9,9 +9,9 @@ namespace octrace::util {
 // blocks of less than 32 MB come from heaps, which keep what is freed. Elsewhere nothing.
 void keep_freed_memory();
 
-// The heap of a thread other than the first grows by a page at a time, a system call and a page
-// fault for each. A thread that is about to take so many bytes in small pieces grows it at once,
-// into large pages.
-void prepare_thread_heap(std::size_t bytes);
+// Heaps grow by small pages, a page fault for each, those of other threads than the first by a system
+// call for each as well. A thread that is about to take so many bytes, less than 32 MB, grows its
+// heap at once, into large pages, which are taken as they are touched.
+void prepare_heap(std::size_t bytes);
 
 }  // namespace octrace::util
