@@ -68,7 +68,7 @@ util::Result<Bytes> read_open(const Descriptor& file, std::uint64_t max_bytes,
   const std::uint64_t count = std::min(size, wanted);
   // What is made of a large file takes several times its size, most of it in pieces that the heap
   // would grow for by small pages: their faults took most of the time to load a scene.
-  if (count >= kLargeFile) util::prepare_heap(std::min(6 * count, kMostPrepared));
+  if (count >= kLargeFile) util::prepare_heap(6 * std::min(count, kMostPrepared / 6));
   Bytes bytes(count);
   std::size_t done = 0;
   while (done < bytes.size()) {

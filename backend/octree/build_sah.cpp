@@ -72,7 +72,8 @@ TopOptions fast_options(bool cuts, bool reinserts) {
 
 void build_sah(const BuildInput& input, const SahOptions& options, Octree& octree) {
   if (input.triangles.empty()) return;
-  // Re-insertion may make a tree too deep.
+  // Re-insertion may make a tree too deep. Where it is not to blame, the second build fails as
+  // well: such scenes are rare.
   for (const bool reinserts : {true, false}) {
     if (options.quality ? build_quality(input, options, reinserts, octree)
                         : build_fast(input, fast_options(options.cuts, reinserts),

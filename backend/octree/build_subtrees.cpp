@@ -56,6 +56,7 @@ class Workplace {
       : all_(all),
         nodes_(std::make_unique_for_overwrite<BinaryNode[]>(2 * std::size_t{all.most})),
         local_(std::make_unique_for_overwrite<LocalTriangle[]>(all.most)),
+        // Every node but a subtree's root has two children or more, so there are not more of them.
         wide_(std::make_unique_for_overwrite<kernels::Node[]>(all.most)),
         written_(all.block_nodes) {}
 
@@ -84,7 +85,7 @@ class Workplace {
  private:
   // Re-insertion makes chains of some fans and stacks, which are better left as they were split.
   bool plan(const TopRange& range, float& cost) {
-    constexpr int kMostReinserted = 48;  // binary levels; splits make 13 to 30 of real scenes
+    constexpr int kMostReinserted = 32;  // binary levels
     room_.build(range, all_.options, all_.references, nodes_.get(), local_.get());
     if (reinsert(nodes_.get(), 2 * std::size_t{range.size}, all_.reinsert)) {
       if (plan_subtree(nodes_.get(), all_.leaf_triangles, kMostReinserted, cost)) return true;
@@ -159,7 +160,7 @@ class TopWriter {
         jobs_(chunks.size()) {}
 
   // `order`: in which subtrees were built, so that their memory is given back while that of the
-  // octree is taken.
+  // octree is taken. False, and nothing taken: the octree would be too deep.
   bool run(const std::vector<std::uint32_t>& order) {
     if (measure(BinaryTree::kRoot, 1) > kernels::kMaxDepth) return false;
     place(BinaryTree::kRoot, 0, 1);
@@ -273,25 +274,29 @@ TopNodes choose_subtrees(const TopTree& top, std::uint32_t most) {
   return TopNodes(top, [&](const TopRange& range) { return subtrees.contains(&range); });
 }
 
+std::uint32_t references_a_thread(const TopNodes& top) {
+  std::uint32_t references = 0;
+  for (const TopRange* range : top.leaves()) references += range->size;
+  return references / static_cast<std::uint32_t>(tbb::this_task_arena::max_concurrency());
+}
+
 // Blocks of a large page each, where every thread fills one; smaller ones where those would stay
 // empty.
 std::size_t block_nodes(std::uint32_t references) {
   constexpr std::size_t kSmall = 2048, kLarge = util::kHugePage / sizeof(kernels::Node) + 1;
-  const auto threads = static_cast<std::uint32_t>(tbb::this_task_arena::max_concurrency());
-  const std::size_t expected = references / threads / 8;  // measured
-  return expected >= kLarge ? kLarge : kSmall;
+  constexpr std::size_t kReferences = 8;  // about so many have a node between them
+  return references / kReferences >= kLarge ? kLarge : kSmall;
 }
 
-// The order in which subtrees are built: as they lie in memory, but the largest first where threads
-// have few each, lest one begins such a one when the others are done.
+// The order in which subtrees are built: as they lie in memory, but first, and the largest before
+// others, those of more than an eighth of what a thread has to build, lest one begins such a one
+// when the others are done.
 std::vector<std::uint32_t> building_order(const TopNodes& top, std::uint32_t references) {
-  const auto threads = static_cast<std::uint32_t>(tbb::this_task_arena::max_concurrency());
-  const std::uint32_t large = references / threads / 8;
   const auto size = [&](std::uint32_t i) { return top.leaves()[i]->size; };
   std::vector<std::uint32_t> order(top.leaves().size());
   std::iota(order.begin(), order.end(), 0u);
-  const auto rest = std::stable_partition(order.begin(), order.end(),
-                                          [&](std::uint32_t i) { return size(i) > large; });
+  const auto rest = std::stable_partition(
+      order.begin(), order.end(), [&](std::uint32_t i) { return size(i) > references / 8; });
   std::stable_sort(order.begin(), rest,
                    [&](std::uint32_t a, std::uint32_t b) { return size(a) > size(b); });
   return order;
@@ -326,14 +331,21 @@ bool build_subtrees(const TopTree& top, const TopOptions& options, std::uint32_t
   const Subtrees all{options,        in_subtrees,
                      leaf_triangles, input,
                      references,     octree.triangles.data(),
-                     most,           block_nodes(top.root->size)};
+                     most,           block_nodes(references_a_thread(nodes))};
   std::vector<Chunk> chunks(nodes.leaves().size());
   std::vector<float> costs(chunks.size());
-  const std::vector<std::uint32_t> order = building_order(nodes, top.root->size);
+  const std::vector<std::uint32_t> order = building_order(nodes, references_a_thread(nodes));
   if (!build_all(nodes, all, order, chunks, costs)) return false;
-  reinsert(nodes.nodes(), nodes.size(), above);
-  return plan_top(nodes.nodes(), costs.data()) &&
-         TopWriter(nodes, chunks, input, octree).run(order);
+  const auto finish = [&] {
+    return plan_top(nodes.nodes(), costs.data()) &&
+           TopWriter(nodes, chunks, input, octree).run(order);
+  };
+  const std::vector<BinaryNode> as_split(nodes.nodes(), nodes.nodes() + nodes.size());
+  if (reinsert(nodes.nodes(), nodes.size(), above)) {
+    if (finish()) return true;
+    std::copy(as_split.begin(), as_split.end(), nodes.nodes());
+  }
+  return finish();
 }
 
 }  // namespace octrace::octree

@@ -19,7 +19,7 @@ inline std::uint32_t about_count(std::uint32_t plan) { return 1u << (plan >> 27)
 // In one slot, the subtree of a planned node is a leaf.
 inline bool is_leaf(const BinaryNode& node) { return (node.plan & kLeafPlan) != 0; }
 
-// Reinsertion may deepen the tree; no tree of use comes near this.
+// Re-insertion may deepen the tree; no tree of use comes near this.
 inline constexpr int kMostBinaryLevels = 1000;
 
 // Overwrites the plans of the tree whose root is nodes[kRoot]. False: it is too deep to be of use.

@@ -4,6 +4,8 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <memory>
+#include <utility>
 #include <vector>
 
 namespace octrace::octree {
@@ -215,14 +217,20 @@ class Reinserter {
     const BinaryNode& node = nodes_[index];
     if (!node.leaf()) parents_[2 * node.child] = parents_[2 * node.child + 1] = index;
   }
+  // Up to where nothing changes.
   void refit(Index index) {
     for (; index != 0; index = parents_[index]) {
       BinaryNode& node = nodes_[index];
       const BinaryNode &a = nodes_[2 * node.child], &b = nodes_[2 * node.child + 1];
+      bool changed = false;
       for (int axis = 0; axis < 3; ++axis) {
-        node.lower[axis] = std::min(a.lower[axis], b.lower[axis]);
-        node.upper[axis] = std::max(a.upper[axis], b.upper[axis]);
+        const float lower = std::min(a.lower[axis], b.lower[axis]);
+        const float upper = std::max(a.upper[axis], b.upper[axis]);
+        changed |= lower != node.lower[axis] || upper != node.upper[axis];
+        node.lower[axis] = lower;
+        node.upper[axis] = upper;
       }
+      if (!changed) return;
     }
   }
 

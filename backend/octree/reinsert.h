@@ -14,8 +14,8 @@ struct ReinsertOptions {
   // changed.
   std::size_t most = std::numeric_limits<std::size_t>::max();
   float least_area = -1.0f;  // half the surface
-  // Nodes that one search looks at. Where boxes overlap a lot, as those of large triangles do,
-  // nothing rules out the rest of the tree.
+  // Nodes that one search looks at beside those above it. Where boxes overlap a lot, as those of
+  // large triangles do, nothing rules out the rest of the tree.
   std::size_t steps = std::numeric_limits<std::size_t>::max();
   float last_gain = 0.02f;  // a round that gains at most this part of the first is the last
   bool parallel = true;     // searches may take all threads

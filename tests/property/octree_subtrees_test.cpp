@@ -431,6 +431,8 @@ TEST(OctreeOfADiscInDust, IsNoWorseThanWithoutReinsertion) {
     EXPECT_LE(octree::statistics(octree).sah_cost, 1.02 * octree::statistics(plain).sah_cost)
         << sectors << " sectors";
     EXPECT_LE(octree::statistics(octree).depth, octree::statistics(plain).depth + 6) << sectors;
+    // Other subtrees are not.
+    EXPECT_FALSE(same_bytes(octree.nodes, plain.nodes)) << sectors;
   }
 }
 
