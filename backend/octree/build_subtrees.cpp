@@ -274,14 +274,8 @@ TopNodes choose_subtrees(const TopTree& top, std::uint32_t most) {
   return TopNodes(top, [&](const TopRange& range) { return subtrees.contains(&range); });
 }
 
-std::uint32_t references_a_thread(const TopNodes& top) {
-  std::uint32_t references = 0;
-  for (const TopRange* range : top.leaves()) references += range->size;
-  return references / static_cast<std::uint32_t>(tbb::this_task_arena::max_concurrency());
-}
-
-// Blocks of a large page each, where every thread fills one; smaller ones where those would stay
-// empty.
+// Blocks of a large page each, where every thread fills one, with so many references for each;
+// smaller ones where those would stay empty.
 std::size_t block_nodes(std::uint32_t references) {
   constexpr std::size_t kSmall = 2048, kLarge = util::kHugePage / sizeof(kernels::Node) + 1;
   constexpr std::size_t kReferences = 8;  // about so many have a node between them
@@ -325,16 +319,17 @@ bool build_subtrees(const TopTree& top, const TopOptions& options, std::uint32_t
   in_subtrees.most = options.reinsert_most;
   in_subtrees.least_area = options.reinsert_area * top.root->bounds.half_area();
   in_subtrees.parallel = false;
+  const std::uint32_t a_thread =
+      top.root->size / static_cast<std::uint32_t>(tbb::this_task_arena::max_concurrency());
   // Enough subtrees for many threads, which need room for one each.
   const std::uint32_t most = std::clamp(top.root->size / 32, kMostInUnit, kMostInSubtree);
   TopNodes nodes = choose_subtrees(top, most);
-  const Subtrees all{options,        in_subtrees,
-                     leaf_triangles, input,
-                     references,     octree.triangles.data(),
-                     most,           block_nodes(references_a_thread(nodes))};
+  const Subtrees all{options, in_subtrees,          leaf_triangles,
+                     input,   references,           octree.triangles.data(),
+                     most,    block_nodes(a_thread)};
   std::vector<Chunk> chunks(nodes.leaves().size());
   std::vector<float> costs(chunks.size());
-  const std::vector<std::uint32_t> order = building_order(nodes, references_a_thread(nodes));
+  const std::vector<std::uint32_t> order = building_order(nodes, a_thread);
   if (!build_all(nodes, all, order, chunks, costs)) return false;
   const auto finish = [&] {
     return plan_top(nodes.nodes(), costs.data()) &&

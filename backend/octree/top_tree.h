@@ -28,8 +28,8 @@ struct TopOptions {
   float least_overlap = 0.01f;
   float duplicates = 0.1f;  // 0: no cuts
   int spatial_misses = 3;
-  // Re-insertion (reinsert.h): in each subtree of the largest nodes, `reinsert_most` of them, if
-  // they are larger than this part of the root's surface; then of the largest above the subtrees.
+  // Re-insertion (reinsert.h): of the largest nodes in each subtree, if they are larger than this
+  // part of the root's surface; then of the largest above the subtrees.
   int reinsert_rounds = 6;
   float reinsert_area = 0.003f;
   std::uint32_t reinsert_most = 256;  // in a subtree

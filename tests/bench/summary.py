@@ -118,9 +118,9 @@ def startup(folder):
         return ""
     shown = []
     for row in rows:
-        over = number(row, "over_empty_ms", "%.0f")
+        over = number(row, "over_empty_ms", "%+.0f")
         most = number(row, "most_ms", "%.0f") or ("+%.0f" % row["most_over_empty_ms"] if over else "")
-        shown.append([row["case"], spread(row, "ms", "%.1f"), "+" + over if over else "", most,
+        shown.append([row["case"], spread(row, "ms", "%.1f"), over, most,
                       number(row, "peak_mb", "%.0f")])
     return "## Start-up: whole processes on two cores\n\n" + table(
         ["process", "ms", "over the empty program", "at most", "peak MB"], shown) + "\n"

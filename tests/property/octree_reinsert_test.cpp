@@ -12,7 +12,7 @@
 #include "backend/octree/build_binary.h"
 #include "backend/octree/builders.h"
 #include "backend/octree/reinsert.h"
-#include "tests/support/meshes.h"
+#include "tests/support/large_meshes.h"
 
 namespace octrace::tests {
 namespace {
@@ -21,23 +21,17 @@ using kernels::Vec3;
 using octree::BinaryNode;
 using octree::BinaryTree;
 
-float uniform(std::mt19937_64& random) { return static_cast<float>(random() >> 40) * 0x1p-24f; }
-
 // Triangles of all sizes, some as large as the scene: nodes overlap, and there is much to gain.
 Mesh make_clutter(std::uint32_t count) {
-  Mesh mesh{"clutter", {}, {}};
-  std::mt19937_64 random(count);
-  for (std::uint32_t i = 0; i < count; ++i) {
-    const auto first = static_cast<std::uint32_t>(mesh.positions.size());
-    const Vec3 centre(uniform(random), uniform(random), uniform(random));
-    const float size = std::exp2(-8.0f * uniform(random));
-    for (int c = 0; c < 3; ++c) {
-      const Vec3 v(uniform(random), uniform(random), uniform(random));
-      mesh.positions.push_back(centre + size * (v - 0.5f));
+  Vec3 centre;
+  float size = 0.0f;
+  return make_mesh("clutter", count, [&](std::uint32_t, int c, std::mt19937_64& random) {
+    if (c == 0) {
+      centre = Vec3(uniform(random), uniform(random), uniform(random));
+      size = std::exp2(-8.0f * uniform(random));
     }
-    mesh.triangles.push_back({first, first + 1, first + 2});
-  }
-  return mesh;
+    return centre + size * (Vec3(uniform(random), uniform(random), uniform(random)) - 0.5f);
+  });
 }
 
 BinaryTree binary_tree(const octree::BuildInput& input) {
