@@ -11,7 +11,9 @@
 
 #include "backend/octree/builders.h"
 #include "backend/octree/exchange.h"
+#include "backend/octree/loose_reference.h"
 #include "backend/octree/reference_blocks.h"
+#include "backend/octree/top_cells.h"
 
 namespace octrace::octree {
 
@@ -20,6 +22,10 @@ namespace {
 // Cuts are made between units only, so that scenes of few triangles need small ones.
 std::uint32_t unit_size(std::uint32_t triangles) {
   return std::clamp<std::uint32_t>(triangles / 64, 64, kMostInUnit);
+}
+
+std::uint32_t total(const TopRange& range) {
+  return range.count + static_cast<std::uint32_t>(range.parts.size());
 }
 
 class TopSplitter {
@@ -37,7 +43,7 @@ class TopSplitter {
     root.count = static_cast<std::uint32_t>(input_.triangles.size());
     root.room = static_cast<std::uint32_t>(
         std::min(double{options_.duplicates} * root.count, 0x7fffffff - double(root.count)));
-    root.bounds = make_references(root.count);
+    make_references(root);
     root_area_ = root.bounds.half_area();
     split(root);
     number(root, 0);
@@ -45,43 +51,41 @@ class TopSplitter {
   }
 
  private:
-  Bounds8 make_references(std::uint32_t count) {
+  // Calls visit(triangle, box) for all of them; returns their bounds.
+  template <class Visit>
+  Bounds8 for_triangles(std::uint32_t count, const Visit& visit) const {
     std::vector<Bounds8> bounds(blocks_of(count));
     for_blocks(count, [&](std::uint32_t block, std::uint32_t first, std::uint32_t own) {
-      bounds[block] = make_references(first, own);
+      Box box, centres;
+      for (std::uint32_t i = first; i < first + own; ++i) {
+        const Box of_triangle = triangle_box(input_, i);
+        box.add(of_triangle);
+        centres.add(of_triangle.centre2());
+        visit(i, of_triangle);
+      }
+      bounds[block] = bounds8(box, centres);
     });
     Bounds8 all;
     for (const Bounds8& block : bounds) all = joined(all, block);
     return all;
   }
-  Bounds8 make_references(std::uint32_t first, std::uint32_t count) {
-    const std::uint32_t* const geometries =
-        input_.triangle_geometry.empty() ? nullptr : input_.triangle_geometry.data();
-    Box box, centres;
-    for (std::uint32_t i = first; i < first + count; ++i) {
-      const kernels::Triangle& t = input_.triangles[i];
-      const Box own = triangle_box(input_, i);
-      box.add(own);
-      centres.add(own.centre2());
-      std::construct_at(references_ + i,
-                        LooseReference{{own.lower[0], own.lower[1], own.lower[2]},
-                                       i,
-                                       {-own.upper[0], -own.upper[1], -own.upper[2]},
-                                       0,
-                                       {t.a, t.b, t.c, geometries ? geometries[i] : 0}});
+  void make_references(TopRange& root) {
+    if (root.count >= options_.least_for_cells) {
+      root.bounds = for_triangles(root.count, [](std::uint32_t, const Box&) {});
+      if (split_by_cells(input_, options_, root, references_)) return;
     }
-    Bounds8 bounds;
-    for (int axis = 0; axis < 3; ++axis) {
-      bounds.box[axis] = box.lower[axis];
-      bounds.box[4 + axis] = -box.upper[axis];
-      bounds.centres[axis] = centres.lower[axis];
-      bounds.centres[4 + axis] = -centres.upper[axis];
-    }
-    return bounds;
+    root.bounds = for_triangles(root.count, [&](std::uint32_t i, const Box& box) {
+      std::construct_at(references_ + i, loose_reference(input_, i, box));
+    });
   }
 
   void split(TopRange& range) {
     if (total(range) <= unit_) return;
+    if (range.lower == nullptr) halve(range);
+    tbb::parallel_invoke([&] { split(*range.lower); }, [&] { split(*range.upper); });
+  }
+
+  void halve(TopRange& range) {
     range.lower = std::make_unique<TopRange>();
     range.upper = std::make_unique<TopRange>();
     TopRange &lower = *range.lower, &upper = *range.upper;
@@ -89,12 +93,8 @@ class TopSplitter {
     lower.first = range.first;
     upper.first = range.first + lower.count;
     upper.count = range.count - lower.count;
-    lower.depth = upper.depth = range.depth + 1;
-    lower.room = static_cast<std::uint32_t>(std::uint64_t{range.room} * total(lower) /
-                                            (std::uint64_t{total(lower)} + total(upper)));
-    upper.room = range.room - lower.room;
+    hand_down(range);
     Parts().swap(range.parts);
-    tbb::parallel_invoke([&] { split(lower); }, [&] { split(upper); });
   }
 
   // Sorts the references, counts those of the lower side and finds both sides' bounds.
@@ -194,10 +194,6 @@ class TopSplitter {
     return true;
   }
 
-  static std::uint32_t total(const TopRange& range) {
-    return range.count + static_cast<std::uint32_t>(range.parts.size());
-  }
-
   static void number(TopRange& range, std::uint32_t place) {
     range.place = place;
     range.size = total(range);
@@ -217,6 +213,14 @@ class TopSplitter {
 };
 
 }  // namespace
+
+void hand_down(TopRange& range) {
+  TopRange &lower = *range.lower, &upper = *range.upper;
+  lower.depth = upper.depth = range.depth + 1;
+  lower.room = static_cast<std::uint32_t>(std::uint64_t{range.room} * total(lower) /
+                                          (std::uint64_t{total(lower)} + total(upper)));
+  upper.room = range.room - lower.room;
+}
 
 TopTree split_top(const BuildInput& input, const TopOptions& options, LooseReference* references) {
   return TopSplitter(input, options, references).run();

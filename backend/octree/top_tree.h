@@ -18,6 +18,11 @@ inline constexpr std::uint32_t kMostInUnit = 1024;
 inline constexpr std::uint32_t kMostInSubtree = 8192;
 
 struct TopOptions {
+  // Scenes of so many triangles are first split by the cells of a grid (top_cells.h), one for so
+  // many triangles, down to ranges of fewer cells along their longest axis than these.
+  std::uint32_t least_for_cells = 1u << 17;
+  std::uint32_t triangles_a_cell = 8;
+  int least_cells = 16;
   int bins = 32;       // of ranges above units
   int unit_bins = 16;  // and in them
   int sah_depth = 64;  // binary levels; below that, ranges are halved by rank
@@ -49,6 +54,9 @@ struct TopRange {
   std::uint32_t place = 0, size = 0;       // where its references are among those of all units
   std::unique_ptr<TopRange> lower, upper;  // both or none
 };
+
+// Depth and room of the halves of a range, whose counts are known.
+void hand_down(TopRange& range);
 
 struct TopTree {
   std::unique_ptr<TopRange> root;

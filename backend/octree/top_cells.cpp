@@ -1,0 +1,323 @@
+// Two passes over the triangles: the first joins their boxes cell by cell, the second writes each
+// reference to the range that its cell has come to. Ranges have their references in the order of
+// the triangles, and joining boxes does not depend on any order once zeros have one sign: so
+// nothing depends on how the passes are shared out.
+#include "backend/octree/top_cells.h"
+
+#include <tbb/parallel_for.h>
+#include <tbb/parallel_invoke.h>
+#include <tbb/task_arena.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "backend/octree/loose_reference.h"
+#include "backend/octree/reference_blocks.h"
+
+namespace octrace::octree {
+
+namespace {
+
+using Int4 = std::int32_t __attribute__((vector_size(16)));
+using Place = std::array<std::int32_t, 3>;  // of a cell, along the axes
+
+// Cubes, in rows along x, those in layers along y.
+class Grid {
+ public:
+  // Over the centres, of at most so many cells.
+  Grid(const Bounds8& bounds, std::uint32_t most) {
+    float extent[3], longest = 0.0f;
+    for (int axis = 0; axis < 3; ++axis) {
+      lower_[axis] = bounds.centres[axis];
+      extent[axis] = -bounds.centres[4 + axis] - bounds.centres[axis];
+      longest = std::max(longest, extent[axis]);
+    }
+    int least = 1, beyond = 1024;  // cells along the longest axis
+    while (beyond - least > 1) {
+      const int across = (least + beyond) / 2;
+      set(extent, longest, across);
+      (size() <= most ? least : beyond) = across;
+    }
+    set(extent, longest, least);
+    usable_ = std::isfinite(longest) && std::isfinite(scale_) && longest > 0.0f;
+  }
+
+  bool usable() const { return usable_; }
+  std::uint64_t size() const {
+    return std::uint64_t(cells_[0]) * std::uint64_t(cells_[1]) * std::uint64_t(cells_[2]);
+  }
+  std::uint32_t cell(Float4 centre2) const {
+    const Int4 at = __builtin_convertvector((centre2 - lower_) * scale_, Int4);
+    const Int4 in = at < last_ ? at : last_;
+    return static_cast<std::uint32_t>(in[0] + cells_[0] * (in[1] + cells_[1] * in[2]));
+  }
+  Place place(std::uint32_t cell) const {
+    const auto at = static_cast<std::int32_t>(cell);
+    return {at % cells_[0], at / cells_[0] % cells_[1], at / cells_[0] / cells_[1]};
+  }
+
+ private:
+  void set(const float (&extent)[3], float longest, int across) {
+    scale_ = static_cast<float>(across) * 0.9999f / longest;
+    for (int axis = 0; axis < 3; ++axis) {
+      const float last = extent[axis] * scale_;
+      last_[axis] = last < static_cast<float>(across) ? static_cast<int>(last) : across - 1;
+      cells_[axis] = last_[axis] + 1;
+    }
+  }
+
+  Float4 lower_{};
+  float scale_ = 0.0f;
+  Int4 last_{};
+  int cells_[3] = {1, 1, 1};
+  bool usable_ = false;
+};
+
+// The bounds of the triangles whose centres are in a cell, and of those centres, as Bounds8 has
+// them.
+struct Cell {
+  Float4 box[2], centres[2];
+
+  void clear() {
+    for (int i = 0; i < 2; ++i) {
+      box[i] = centres[i] = Float4{} + std::numeric_limits<float>::infinity();
+    }
+  }
+  void add(const Cell& other) {
+    for (int i = 0; i < 2; ++i) {
+      box[i] = lesser(box[i], other.box[i]);
+      centres[i] = lesser(centres[i], other.centres[i]);
+    }
+  }
+};
+
+struct Cells {
+  util::HugeVector<Cell> cells;
+  util::HugeVector<std::uint32_t> counts;
+
+  void resize(std::size_t size) {
+    cells.resize(size);
+    counts.resize(size);
+    for (Cell& cell : cells) cell.clear();
+    std::fill(counts.begin(), counts.end(), 0u);
+  }
+};
+
+// A cell that is not empty.
+struct Item {
+  Place at;
+  std::uint32_t cell;
+};
+
+struct Leaf {
+  TopRange* range;
+  std::span<Item> items;
+};
+
+// A share of the triangles, which one thread takes.
+struct Share {
+  std::uint32_t first, last;
+};
+
+std::vector<Share> shares(std::uint32_t count, std::uint32_t number) {
+  std::vector<Share> all;
+  for (std::uint64_t i = 0; i < number; ++i) {
+    all.push_back({static_cast<std::uint32_t>(i * count / number),
+                   static_cast<std::uint32_t>((i + 1) * count / number)});
+  }
+  return all;
+}
+
+class CellSplitter {
+ public:
+  CellSplitter(const BuildInput& input, const TopOptions& options, const Grid& grid,
+               const TopRange& root)
+      : input_(input),
+        options_(options),
+        grid_(grid),
+        root_area_(root.bounds.half_area()),
+        threads_(static_cast<std::uint32_t>(tbb::this_task_arena::max_concurrency())) {}
+
+  void run(TopRange& root, LooseReference* references) {
+    fill(root.count);
+    std::vector<Item> items = occupied();
+    std::vector<Leaf> leaves;
+    split(root, items, leaves);
+    all_.cells = {};
+    place(root, 0);
+    write(leaves, references);
+  }
+
+ private:
+  void fill(std::uint32_t count) {
+    const std::size_t size = grid_.size();
+    cell_of_.resize(count);
+    // Grids of other threads go to memory that the references do not need yet.
+    const std::uint64_t room = std::uint64_t{count} * sizeof(LooseReference) / 2;
+    const std::uint64_t most = std::max<std::uint64_t>(room / (size * (sizeof(Cell) + 4)), 1);
+    const std::vector<Share> all =
+        shares(count, static_cast<std::uint32_t>(std::min<std::uint64_t>(most, threads_)));
+    std::vector<Cells> cells(all.size());
+    tbb::parallel_for(std::size_t{0}, all.size(), [&](std::size_t i) {
+      cells[i].resize(size);
+      fill(all[i], cells[i]);
+    });
+    all_ = std::move(cells[0]);
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, size, kBlock), [&](const auto& range) {
+      for (std::size_t i = 1; i < cells.size(); ++i) {
+        for (std::size_t cell = range.begin(); cell < range.end(); ++cell) {
+          all_.cells[cell].add(cells[i].cells[cell]);
+          all_.counts[cell] += cells[i].counts[cell];
+        }
+      }
+    });
+  }
+  void fill(const Share& share, Cells& cells) {
+    for (std::uint32_t i = share.first; i < share.last; ++i) {
+      const Box box = triangle_box(input_, i);
+      // The sign of a zero would be that of whichever triangle came first.
+      constexpr Float4 kZero{};
+      const Float4 centre = kZero + box.centre2();
+      const std::uint32_t cell = grid_.cell(centre);
+      cell_of_[i] = cell;
+      cells.cells[cell].add(
+          {{kZero + box.lower, kZero - box.upper}, {centre, kZero - centre}});
+      ++cells.counts[cell];
+    }
+  }
+
+  std::vector<Item> occupied() const {
+    std::vector<Item> items;
+    for (std::uint32_t cell = 0; cell < all_.counts.size(); ++cell) {
+      if (all_.counts[cell] != 0) items.push_back({grid_.place(cell), cell});
+    }
+    return items;
+  }
+
+  // Sets the range's count and bounds as well, and lists the leaves in order.
+  void split(TopRange& range, std::span<Item> items, std::vector<Leaf>& leaves) {
+    Place least = items[0].at, greatest = least;
+    for (const Item& item : items) {
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        least[axis] = std::min(least[axis], item.at[axis]);
+        greatest[axis] = std::max(greatest[axis], item.at[axis]);
+      }
+    }
+    int across = 0;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      across = std::max(across, greatest[axis] - least[axis] + 1);
+    }
+    const std::size_t middle = across < options_.least_cells ? 0 : divide(range, items, least, across);
+    if (middle == 0) {
+      leaves.push_back({&range, items});
+      return;
+    }
+    std::vector<Leaf> more;
+    tbb::parallel_invoke([&] { split(*range.lower, items.first(middle), leaves); },
+                         [&] { split(*range.upper, items.subspan(middle), more); });
+    leaves.insert(leaves.end(), more.begin(), more.end());
+  }
+
+  // Returns how many of the items, which are sorted, are in the lower range; 0: the range stays as
+  // it is.
+  std::size_t divide(TopRange& range, std::span<Item> items, const Place& least, int across) {
+    if (range.depth >= options_.sah_depth) return 0;
+    const auto bin = [&](const Item& item, std::size_t axis) {
+      const int at = item.at[axis] - least[axis];
+      return across <= kMaxBins ? at : at * kMaxBins / across;
+    };
+    ObjectBins bins;
+    bins.clear(kMaxBins);
+    for (const Item& item : items) {
+      const Cell& cell = all_.cells[item.cell];
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        const int at = bin(item, axis);
+        auto* const row = reinterpret_cast<Float4*>(bins.boxes[axis][at]);
+        for (int i = 0; i < 2; ++i) row[i] = lesser(row[i], cell.box[i]);
+        bins.counts[axis][at] += all_.counts[item.cell];
+      }
+    }
+    const ObjectSplit chosen = splitter_.best(bins, kMaxBins);
+    if (chosen.axis < 0) return 0;
+    if (range.room != 0 && chosen.overlap > options_.least_overlap * root_area_) return 0;
+    const auto axis = static_cast<std::size_t>(chosen.axis);
+    const auto middle = std::partition(items.begin(), items.end(), [&](const Item& item) {
+      return bin(item, axis) < chosen.bin;
+    });
+    range.lower = std::make_unique<TopRange>();
+    range.upper = std::make_unique<TopRange>();
+    sum({items.begin(), middle}, *range.lower);
+    sum({middle, items.end()}, *range.upper);
+    hand_down(range);
+    return static_cast<std::size_t>(middle - items.begin());
+  }
+
+  void sum(std::span<const Item> items, TopRange& range) const {
+    Cell all;
+    all.clear();
+    for (const Item& item : items) {
+      all.add(all_.cells[item.cell]);
+      range.count += all_.counts[item.cell];
+    }
+    std::memcpy(range.bounds.box, all.box, sizeof all.box);
+    std::memcpy(range.bounds.centres, all.centres, sizeof all.centres);
+  }
+
+  static void place(TopRange& range, std::uint32_t first) {
+    range.first = first;
+    if (range.lower == nullptr) return;
+    place(*range.lower, first);
+    place(*range.upper, first + range.lower->count);
+  }
+
+  void write(const std::vector<Leaf>& leaves, LooseReference* references) {
+    util::HugeVector<std::uint32_t>& leaf_of = all_.counts;
+    for (std::uint32_t leaf = 0; leaf < leaves.size(); ++leaf) {
+      for (const Item& item : leaves[leaf].items) leaf_of[item.cell] = leaf;
+    }
+    const auto count = static_cast<std::uint32_t>(cell_of_.size());
+    const std::vector<Share> all = shares(count, threads_ == 1 ? 1 : 4 * threads_);
+    // Where the next reference of a leaf goes, for each share.
+    std::vector<std::vector<std::uint32_t>> next(all.size());
+    tbb::parallel_for(std::size_t{0}, all.size(), [&](std::size_t i) {
+      next[i].resize(leaves.size());
+      for (std::uint32_t t = all[i].first; t < all[i].last; ++t) ++next[i][leaf_of[cell_of_[t]]];
+    });
+    for (std::size_t leaf = 0; leaf < leaves.size(); ++leaf) {
+      std::uint32_t first = leaves[leaf].range->first;
+      for (auto& of_share : next) first += std::exchange(of_share[leaf], first);
+    }
+    tbb::parallel_for(std::size_t{0}, all.size(), [&](std::size_t i) {
+      for (std::uint32_t t = all[i].first; t < all[i].last; ++t) {
+        std::construct_at(references + next[i][leaf_of[cell_of_[t]]]++,
+                          loose_reference(input_, t, triangle_box(input_, t)));
+      }
+    });
+  }
+
+  const BuildInput& input_;
+  const TopOptions& options_;
+  const Grid& grid_;
+  const float root_area_;
+  const std::uint32_t threads_;
+  const ObjectSplitter splitter_;
+  Cells all_;
+  util::HugeVector<std::uint32_t> cell_of_;  // by triangle
+};
+
+}  // namespace
+
+bool split_by_cells(const BuildInput& input, const TopOptions& options, TopRange& root,
+                    LooseReference* references) {
+  const Grid grid(root.bounds, std::max(root.count / options.triangles_a_cell, 1u));
+  if (!grid.usable()) return false;
+  CellSplitter(input, options, grid, root).run(root, references);
+  return true;
+}
+
+}  // namespace octrace::octree
