@@ -107,6 +107,7 @@ HWY_ATTR void fill_space(const BuildInput& input, const LooseReference* referenc
   const auto low = hn::LoadU(kHalfTag, binning.lower);
   const auto scale = hn::LoadU(kHalfTag, binning.scale);
   const auto zero = hn::Zero(di), most = hn::Set(di, binning.bins - 1);
+  const auto axes = hn::FirstN(kHalfTag, 3);  // as in fill_bins()
 #endif
   for (std::uint32_t start = 0; start < count; start += kFew) {
     const LooseReference* from = references + start;
@@ -115,8 +116,10 @@ HWY_ATTR void fill_space(const BuildInput& input, const LooseReference* referenc
 #if HWY_TARGET != HWY_SCALAR
       const auto lower = hn::Load(kHalfTag, from[i].lower);
       const auto upper = hn::Neg(hn::Load(kHalfTag, from[i].negated_upper));
-      const auto begin = hn::ConvertTo(di, hn::Mul(hn::Sub(lower, low), scale));
-      const auto end = hn::ConvertTo(di, hn::Mul(hn::Sub(upper, low), scale));
+      const auto begin =
+          hn::ConvertTo(di, hn::Mul(hn::IfThenElseZero(axes, hn::Sub(lower, low)), scale));
+      const auto end =
+          hn::ConvertTo(di, hn::Mul(hn::IfThenElseZero(axes, hn::Sub(upper, low)), scale));
       hn::Store(hn::Min(hn::Max(begin, zero), most), di, first[i]);
       hn::Store(hn::Min(hn::Max(end, zero), most), di, last[i]);
 #else

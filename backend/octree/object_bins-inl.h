@@ -40,6 +40,8 @@ HWY_ATTR HWY_INLINE void fill_bins(const R* references, std::uint32_t count, con
   const auto low = hn::LoadU(kHalfTag, binning.lower);
   const auto scale = hn::LoadU(kHalfTag, binning.scale);
   const auto most = hn::Set(di, binning.bins - 1);
+  // What lies behind the axes are numbers whose products as floats take some processors long.
+  const auto axes = hn::FirstN(kHalfTag, 3);
 #endif
   for (std::uint32_t first = 0; first < count; first += kFew) {
     const R* from = references + first;
@@ -48,7 +50,8 @@ HWY_ATTR HWY_INLINE void fill_bins(const R* references, std::uint32_t count, con
 #if HWY_TARGET != HWY_SCALAR
       const auto lower = hn::Load(kHalfTag, from[i].lower);
       const auto upper = hn::Load(kHalfTag, from[i].negated_upper);
-      const auto position = hn::Mul(hn::Sub(hn::Sub(lower, upper), low), scale);
+      const auto offset = hn::Sub(hn::Sub(lower, upper), low);
+      const auto position = hn::Mul(hn::IfThenElseZero(axes, offset), scale);
       hn::Store(hn::Min(hn::ConvertTo(di, position), most), di, bin[i]);
 #else
       for (int axis = 0; axis < 3; ++axis) bin[i][axis] = binning.bin(from[i].centre2(axis), axis);
