@@ -11,12 +11,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstring>
 #include <span>
 #include <utility>
 #include <vector>
 
 #include "backend/octree/loose_reference.h"
+#include "backend/octree/loose_split.h"
 #include "backend/octree/reference_blocks.h"
 
 namespace octrace::octree {
@@ -78,35 +78,36 @@ class Grid {
   bool usable_ = false;
 };
 
-// The bounds of the triangles whose centres are in a cell, and of those centres, as Bounds8 has
-// them.
-struct Cell {
-  Float4 box[2], centres[2];
-
+// How many triangles have their centres in a cell, and the box around all of them.
+class Cell {
+ public:
   void clear() {
-    for (int i = 0; i < 2; ++i) {
-      box[i] = centres[i] = Float4{} + std::numeric_limits<float>::infinity();
-    }
+    constexpr float kInfinity = std::numeric_limits<float>::infinity();
+    lower_ = Float4{kInfinity, kInfinity, kInfinity, 0.0f};
+    negated_upper_ = Float4{} + kInfinity;
   }
-  void add(const Cell& other) {
-    for (int i = 0; i < 2; ++i) {
-      box[i] = lesser(box[i], other.box[i]);
-      centres[i] = lesser(centres[i], other.centres[i]);
-    }
+  void add(Float4 lower, Float4 negated_upper, std::int32_t count) {
+    constexpr Int4 kAxes{-1, -1, -1, 0};
+    const auto sum =
+        reinterpret_cast<Float4>(reinterpret_cast<Int4>(lower_) + Int4{0, 0, 0, count});
+    lower_ = kAxes ? lesser(lower_, lower) : sum;
+    negated_upper_ = lesser(negated_upper_, negated_upper);
   }
+  void add(const Cell& other) { add(other.lower_, other.negated_upper_, other.signed_count()); }
+
+  // Word 3 of neither means anything.
+  Float4 lower() const { return lower_; }
+  Float4 negated_upper() const { return negated_upper_; }
+  std::uint32_t count() const { return static_cast<std::uint32_t>(signed_count()); }
+
+ private:
+  std::int32_t signed_count() const { return reinterpret_cast<Int4>(lower_)[3]; }
+
+  Float4 lower_;  // and the count as word 3, so that both are stored at once
+  Float4 negated_upper_;
 };
 
-struct Cells {
-  util::HugeVector<Cell> cells;
-  util::HugeVector<std::uint32_t> counts;
-
-  void resize(std::size_t size) {
-    cells.resize(size);
-    counts.resize(size);
-    for (Cell& cell : cells) cell.clear();
-    std::fill(counts.begin(), counts.end(), 0u);
-  }
-};
+using Cells = util::HugeVector<Cell>;
 
 // A cell that is not empty.
 struct Item {
@@ -148,7 +149,7 @@ class CellSplitter {
     std::vector<Item> items = occupied();
     std::vector<Leaf> leaves;
     split(root, items, leaves);
-    all_.cells = {};
+    Cells().swap(cells_);
     place(root, 0);
     write(leaves, references);
   }
@@ -157,49 +158,45 @@ class CellSplitter {
   void fill(std::uint32_t count) {
     const std::size_t size = grid_.size();
     cell_of_.resize(count);
-    // Grids of other threads go to memory that the references do not need yet.
-    const std::uint64_t room = std::uint64_t{count} * sizeof(LooseReference) / 2;
-    const std::uint64_t most = std::max<std::uint64_t>(room / (size * (sizeof(Cell) + 4)), 1);
+    // Each thread fills cells of its own, in as much memory as the references will take.
+    const std::uint64_t most =
+        std::uint64_t{count} * sizeof(LooseReference) / (size * sizeof(Cell));
     const std::vector<Share> all =
-        shares(count, static_cast<std::uint32_t>(std::min<std::uint64_t>(most, threads_)));
+        shares(count, static_cast<std::uint32_t>(std::clamp<std::uint64_t>(most, 1, threads_)));
     std::vector<Cells> cells(all.size());
     tbb::parallel_for(std::size_t{0}, all.size(), [&](std::size_t i) {
       cells[i].resize(size);
       fill(all[i], cells[i]);
     });
-    all_ = std::move(cells[0]);
+    cells_ = std::move(cells[0]);
+    if (all.size() == 1) return;
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, size, kBlock), [&](const auto& range) {
       for (std::size_t i = 1; i < cells.size(); ++i) {
-        for (std::size_t cell = range.begin(); cell < range.end(); ++cell) {
-          all_.cells[cell].add(cells[i].cells[cell]);
-          all_.counts[cell] += cells[i].counts[cell];
-        }
+        for (std::size_t c = range.begin(); c < range.end(); ++c) cells_[c].add(cells[i][c]);
       }
     });
   }
   void fill(const Share& share, Cells& cells) {
+    for (Cell& cell : cells) cell.clear();
     for (std::uint32_t i = share.first; i < share.last; ++i) {
       const Box box = triangle_box(input_, i);
-      // The sign of a zero would be that of whichever triangle came first.
-      constexpr Float4 kZero{};
-      const Float4 centre = kZero + box.centre2();
-      const std::uint32_t cell = grid_.cell(centre);
+      const std::uint32_t cell = grid_.cell(box.centre2());
       cell_of_[i] = cell;
-      cells.cells[cell].add(
-          {{kZero + box.lower, kZero - box.upper}, {centre, kZero - centre}});
-      ++cells.counts[cell];
+      // The sign of a zero would be that of whichever triangle came last.
+      constexpr Float4 kZero{};
+      cells[cell].add(kZero + box.lower, kZero - box.upper, 1);
     }
   }
 
   std::vector<Item> occupied() const {
     std::vector<Item> items;
-    for (std::uint32_t cell = 0; cell < all_.counts.size(); ++cell) {
-      if (all_.counts[cell] != 0) items.push_back({grid_.place(cell), cell});
+    for (std::uint32_t cell = 0; cell < cells_.size(); ++cell) {
+      if (cells_[cell].count() != 0) items.push_back({grid_.place(cell), cell});
     }
     return items;
   }
 
-  // Sets the range's count and bounds as well, and lists the leaves in order.
+  // Lists the leaves in order.
   void split(TopRange& range, std::span<Item> items, std::vector<Leaf>& leaves) {
     Place least = items[0].at, greatest = least;
     for (const Item& item : items) {
@@ -212,7 +209,8 @@ class CellSplitter {
     for (std::size_t axis = 0; axis < 3; ++axis) {
       across = std::max(across, greatest[axis] - least[axis] + 1);
     }
-    const std::size_t middle = across < options_.least_cells ? 0 : divide(range, items, least, across);
+    const std::size_t middle =
+        across < options_.least_cells ? 0 : divide(range, items, least, across);
     if (middle == 0) {
       leaves.push_back({&range, items});
       return;
@@ -234,21 +232,21 @@ class CellSplitter {
     ObjectBins bins;
     bins.clear(kMaxBins);
     for (const Item& item : items) {
-      const Cell& cell = all_.cells[item.cell];
+      const Cell& cell = cells_[item.cell];
       for (std::size_t axis = 0; axis < 3; ++axis) {
         const int at = bin(item, axis);
         auto* const row = reinterpret_cast<Float4*>(bins.boxes[axis][at]);
-        for (int i = 0; i < 2; ++i) row[i] = lesser(row[i], cell.box[i]);
-        bins.counts[axis][at] += all_.counts[item.cell];
+        row[0] = lesser(row[0], cell.lower());
+        row[1] = lesser(row[1], cell.negated_upper());
+        bins.counts[axis][at] += cell.count();
       }
     }
     const ObjectSplit chosen = splitter_.best(bins, kMaxBins);
     if (chosen.axis < 0) return 0;
     if (range.room != 0 && chosen.overlap > options_.least_overlap * root_area_) return 0;
     const auto axis = static_cast<std::size_t>(chosen.axis);
-    const auto middle = std::partition(items.begin(), items.end(), [&](const Item& item) {
-      return bin(item, axis) < chosen.bin;
-    });
+    const auto middle = std::partition(
+        items.begin(), items.end(), [&](const Item& item) { return bin(item, axis) < chosen.bin; });
     range.lower = std::make_unique<TopRange>();
     range.upper = std::make_unique<TopRange>();
     sum({items.begin(), middle}, *range.lower);
@@ -257,15 +255,16 @@ class CellSplitter {
     return static_cast<std::size_t>(middle - items.begin());
   }
 
+  // The bounds of the centres are found when the references are written.
   void sum(std::span<const Item> items, TopRange& range) const {
     Cell all;
     all.clear();
-    for (const Item& item : items) {
-      all.add(all_.cells[item.cell]);
-      range.count += all_.counts[item.cell];
+    for (const Item& item : items) all.add(cells_[item.cell]);
+    for (int axis = 0; axis < 3; ++axis) {
+      range.bounds.box[axis] = all.lower()[axis];
+      range.bounds.box[4 + axis] = all.negated_upper()[axis];
     }
-    std::memcpy(range.bounds.box, all.box, sizeof all.box);
-    std::memcpy(range.bounds.centres, all.centres, sizeof all.centres);
+    range.count = all.count();
   }
 
   static void place(TopRange& range, std::uint32_t first) {
@@ -275,29 +274,49 @@ class CellSplitter {
     place(*range.upper, first + range.lower->count);
   }
 
+  // Where the next reference of a leaf goes, and the bounds of the centres of those that are there.
+  struct Cursor {
+    std::uint32_t next = 0;
+    Box centres;
+  };
+
   void write(const std::vector<Leaf>& leaves, LooseReference* references) {
-    util::HugeVector<std::uint32_t>& leaf_of = all_.counts;
+    util::HugeVector<std::uint32_t> leaf_of(grid_.size());
     for (std::uint32_t leaf = 0; leaf < leaves.size(); ++leaf) {
       for (const Item& item : leaves[leaf].items) leaf_of[item.cell] = leaf;
     }
     const auto count = static_cast<std::uint32_t>(cell_of_.size());
     const std::vector<Share> all = shares(count, threads_ == 1 ? 1 : 4 * threads_);
-    // Where the next reference of a leaf goes, for each share.
-    std::vector<std::vector<std::uint32_t>> next(all.size());
+    std::vector<std::vector<Cursor>> cursors(all.size());
     tbb::parallel_for(std::size_t{0}, all.size(), [&](std::size_t i) {
-      next[i].resize(leaves.size());
-      for (std::uint32_t t = all[i].first; t < all[i].last; ++t) ++next[i][leaf_of[cell_of_[t]]];
+      cursors[i].resize(leaves.size());
+      for (std::uint32_t t = all[i].first; t < all[i].last; ++t) {
+        const std::uint32_t leaf = leaf_of[cell_of_[t]];
+        cell_of_[t] = leaf;
+        ++cursors[i][leaf].next;
+      }
     });
     for (std::size_t leaf = 0; leaf < leaves.size(); ++leaf) {
       std::uint32_t first = leaves[leaf].range->first;
-      for (auto& of_share : next) first += std::exchange(of_share[leaf], first);
+      for (auto& of_share : cursors) first += std::exchange(of_share[leaf].next, first);
     }
     tbb::parallel_for(std::size_t{0}, all.size(), [&](std::size_t i) {
       for (std::uint32_t t = all[i].first; t < all[i].last; ++t) {
-        std::construct_at(references + next[i][leaf_of[cell_of_[t]]]++,
-                          loose_reference(input_, t, triangle_box(input_, t)));
+        Cursor& cursor = cursors[i][cell_of_[t]];
+        const Box box = triangle_box(input_, t);
+        cursor.centres.add(box.centre2());
+        std::construct_at(references + cursor.next++, loose_reference(input_, t, box));
       }
     });
+    for (std::size_t leaf = 0; leaf < leaves.size(); ++leaf) {
+      Box centres;
+      for (const auto& of_share : cursors) centres.add(of_share[leaf].centres);
+      Bounds8& bounds = leaves[leaf].range->bounds;
+      for (int axis = 0; axis < 3; ++axis) {
+        bounds.centres[axis] = centres.lower[axis];
+        bounds.centres[4 + axis] = -centres.upper[axis];
+      }
+    }
   }
 
   const BuildInput& input_;
@@ -306,16 +325,39 @@ class CellSplitter {
   const float root_area_;
   const std::uint32_t threads_;
   const ObjectSplitter splitter_;
-  Cells all_;
-  util::HugeVector<std::uint32_t> cell_of_;  // by triangle
+  Cells cells_;
+  util::HugeVector<std::uint32_t> cell_of_;  // by triangle; then its leaf
 };
+
+// Whether the sides of a first split between some of the triangles would call for cuts.
+bool seems_to_overlap(const BuildInput& input, const TopOptions& options) {
+  constexpr std::size_t kMost = 8192;
+  const std::size_t count = input.triangles.size(), stride = (count + kMost - 1) / kMost;
+  std::vector<LooseReference> some;
+  for (std::size_t i = 0; i < count; i += stride) {
+    const auto triangle = static_cast<std::uint32_t>(i);
+    some.push_back(loose_reference(input, triangle, triangle_box(input, triangle)));
+  }
+  const LooseSplitter splitter;
+  const auto number = static_cast<std::uint32_t>(some.size());
+  const Bounds8 bounds = splitter.bounds(some.data(), number);
+  const Binning binning(bounds, options.bins);
+  ObjectBins bins;
+  bins.clear(options.bins);
+  splitter.fill(some.data(), number, binning, bins);
+  return ObjectSplitter().best(bins, options.bins).overlap >
+         options.least_overlap * bounds.half_area();
+}
 
 }  // namespace
 
 bool split_by_cells(const BuildInput& input, const TopOptions& options, TopRange& root,
                     LooseReference* references) {
-  const Grid grid(root.bounds, std::max(root.count / options.triangles_a_cell, 1u));
+  if (root.room != 0 && seems_to_overlap(input, options)) return false;
+  const Bounds8 bounds = for_triangles(input, [](std::uint32_t, const Box&) {});
+  const Grid grid(bounds, std::max(root.count / options.triangles_a_cell, 1u));
   if (!grid.usable()) return false;
+  root.bounds = bounds;
   CellSplitter(input, options, grid, root).run(root, references);
   return true;
 }

@@ -6,9 +6,10 @@
 
 namespace octrace::octree {
 
-// Splits the root, whose bounds, count and room are known, as long as its ranges are many cells
-// wide and no cuts are called for; writes all references, in the order of the ranges. The same for
-// any number of threads. False, and nothing done: centres cannot be told apart, or are infinite.
+// Splits the root, whose count and room are known, as long as its ranges are many cells wide and no
+// cuts are called for; finds its bounds and writes all references, in the order of the ranges. The
+// same for any number of threads. False, and nothing done: of some of the triangles it seems that
+// cuts are called for at once; or centres cannot be told apart, or are infinite.
 bool split_by_cells(const BuildInput& input, const TopOptions& options, TopRange& root,
                     LooseReference* references);
 

@@ -51,30 +51,12 @@ class TopSplitter {
   }
 
  private:
-  // Calls visit(triangle, box) for all of them; returns their bounds.
-  template <class Visit>
-  Bounds8 for_triangles(std::uint32_t count, const Visit& visit) const {
-    std::vector<Bounds8> bounds(blocks_of(count));
-    for_blocks(count, [&](std::uint32_t block, std::uint32_t first, std::uint32_t own) {
-      Box box, centres;
-      for (std::uint32_t i = first; i < first + own; ++i) {
-        const Box of_triangle = triangle_box(input_, i);
-        box.add(of_triangle);
-        centres.add(of_triangle.centre2());
-        visit(i, of_triangle);
-      }
-      bounds[block] = bounds8(box, centres);
-    });
-    Bounds8 all;
-    for (const Bounds8& block : bounds) all = joined(all, block);
-    return all;
-  }
   void make_references(TopRange& root) {
-    if (root.count >= options_.least_for_cells) {
-      root.bounds = for_triangles(root.count, [](std::uint32_t, const Box&) {});
-      if (split_by_cells(input_, options_, root, references_)) return;
+    if (root.count >= options_.least_for_cells &&
+        split_by_cells(input_, options_, root, references_)) {
+      return;
     }
-    root.bounds = for_triangles(root.count, [&](std::uint32_t i, const Box& box) {
+    root.bounds = for_triangles(input_, [&](std::uint32_t i, const Box& box) {
       std::construct_at(references_ + i, loose_reference(input_, i, box));
     });
   }
