@@ -3,7 +3,6 @@
 // tree with more cuts (build_binary.h), more of it re-inserted, collapsed into eight-way nodes
 // (collapse.h).
 #include <algorithm>
-#include <cstdlib>
 #include <stdexcept>
 
 #include "backend/octree/build_binary.h"
@@ -64,9 +63,6 @@ bool build_quality(const BuildInput& input, const SahOptions& options, bool rein
 
 TopOptions fast_options(bool cuts, bool reinserts) {
   TopOptions options;
-  if (getenv("LFC")) options.least_for_cells = atoi(getenv("LFC"));
-  if (getenv("TAC")) options.triangles_a_cell = atoi(getenv("TAC"));
-  if (getenv("LC")) options.least_cells = atoi(getenv("LC"));
   if (!cuts) options.duplicates = 0.0f;
   if (!reinserts) options.reinsert_rounds = 0;
   return options;

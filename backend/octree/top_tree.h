@@ -22,7 +22,7 @@ struct TopOptions {
   // many triangles, down to ranges of fewer cells along their longest axis than these.
   std::uint32_t least_for_cells = 1u << 17;
   std::uint32_t triangles_a_cell = 8;
-  int least_cells = 16;
+  int least_cells = 8;
   int bins = 32;       // of ranges above units
   int unit_bins = 16;  // and in them
   int sah_depth = 64;  // binary levels; below that, ranges are halved by rank
