@@ -31,10 +31,16 @@ constexpr std::uint32_t leaf_units(std::uint32_t triangles) {
   return (triangles * kBytes + sizeof(WideUnit) - 1) / sizeof(WideUnit);
 }
 
+// As std::nextafter() towards minus infinity, which is a call, of what is no NaN.
+float next_below(float value) {
+  if (value == 0.0f) return -std::numeric_limits<float>::denorm_min();
+  const auto bits = std::bit_cast<std::uint32_t>(value);
+  return std::bit_cast<float>(value > 0.0f ? bits - 1 : bits + 1);
+}
+
 float below(double value) {
   const auto rounded = static_cast<float>(value);
-  return rounded > value ? std::nextafter(rounded, -std::numeric_limits<float>::infinity())
-                         : rounded;
+  return rounded > value ? next_below(rounded) : rounded;
 }
 
 float above(double value) { return -below(-value); }
@@ -151,23 +157,17 @@ class Widener {
     box.add(float4(t.a));
     box.add(float4(t.b));
     box.add(float4(t.c));
-    float side = 0.0f;
-    for (int axis = 0; axis < 3; ++axis) {
-      side = std::max<float>(side, box.upper[axis] - box.lower[axis]);
-    }
-    const float margin = side * 0x1p-18f;
-    for (int axis = 0; axis < 3; ++axis) {
-      box.lower[axis] -= margin;
-      box.upper[axis] += margin;
-    }
+    const Float4 extent = box.upper - box.lower;
+    const float side = std::max<float>({extent[0], extent[1], extent[2]});
+    const Float4 margin = Float4{} + side * 0x1p-18f;
+    box.lower -= margin;
+    box.upper += margin;
     return box;
   }
 
   static void narrow(Box& box, const Box& to) {
-    for (int axis = 0; axis < 3; ++axis) {
-      box.lower[axis] = std::max<float>(box.lower[axis], to.lower[axis]);
-      box.upper[axis] = std::min<float>(box.upper[axis], to.upper[axis]);
-    }
+    box.lower = greater(box.lower, to.lower);
+    box.upper = lesser(box.upper, to.upper);
   }
 
   // Adds the triangles of a leaf slot, or of all leaf slots of a small subtree.
