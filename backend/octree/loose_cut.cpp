@@ -54,7 +54,8 @@ Block cut_block(const BuildInput& input, const LooseReference* references, std::
 SpatialSplit best_cut(const BuildInput& input, const LooseSplitter& splitter,
                       const LooseRange& range, const Bounds8& bounds, std::uint32_t room,
                       int bin_count) {
-  const SpatialBinning binning(bounds, bin_count);
+  SpatialBinning binning(bounds, bin_count);
+  binning.leave_out_shortest();
   SpatialBins bins = tbb::parallel_reduce(
       tbb::blocked_range<std::uint32_t>(0, range.count, kParallel), SpatialBins(),
       [&](const auto& r, SpatialBins sum) {

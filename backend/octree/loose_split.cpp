@@ -81,7 +81,7 @@ HWY_ATTR HWY_NOINLINE void fill_across(const BuildInput& input, const LooseRefer
                                        const SpatialBinning& binning, const Clips& clips,
                                        SpatialBins& bins) {
   const bool cuts = may_cut(input, reference.corners.geometry);
-  for (int axis = 0; axis < 3; ++axis) {
+  for (const int axis : binning.axes) {
     std::int32_t bin = first[axis], end = last[axis];
     if (!cuts) bin = end = binning.bin(0.5f * reference.centre2(axis), axis);
     ++bins.enter[axis][bin];
@@ -136,13 +136,13 @@ HWY_ATTR void fill_space(const BuildInput& input, const LooseReference* referenc
         continue;
       }
       const Box8 box = load(from[i]);
-      for (int axis = 0; axis < 3; ++axis) {
+      for (const int axis : binning.axes) {
         join(box, bins.parts[axis][begin[axis]]);
         ++within[axis][begin[axis]];
       }
     }
   }
-  for (int axis = 0; axis < 3; ++axis) {
+  for (const int axis : binning.axes) {
     for (int bin = 0; bin < binning.bins; ++bin) {
       bins.enter[axis][bin] += within[axis][bin];
       bins.leave[axis][bin] += within[axis][bin];

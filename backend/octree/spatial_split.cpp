@@ -138,6 +138,16 @@ SpatialBinning::SpatialBinning(const Bounds8& bounds, int bin_count) : bins(bin_
   lower[3] = scale[3] = 0.0f;
 }
 
+void SpatialBinning::leave_out_shortest() {
+  int shortest = 0;
+  for (int axis = 1; axis < 3; ++axis) {
+    if (extent[axis] <= extent[shortest]) shortest = axis;
+  }
+  extent[shortest] = scale[shortest] = 0.0f;
+  axes[0] = shortest == 0 ? 1 : 0;
+  axes[1] = shortest == 2 ? 1 : 2;
+}
+
 float SpatialBinning::plane(int axis, int bin) const {
   return lower[axis] + extent[axis] * (static_cast<float>(bin) / static_cast<float>(bins));
 }

@@ -23,7 +23,11 @@ struct SpatialBinning {
   float scale[4];
   int bins;
 
+  int axes[2] = {0, 1};  // those that leave_out_shortest() leaves
+
   SpatialBinning(const Bounds8& bounds, int bin_count);
+  // Cuts across the shortest side are hardly ever the cheapest.
+  void leave_out_shortest();
   float plane(int axis, int bin) const;  // the lower end of the bin
   int bin(float position, int axis) const {
     return std::clamp(static_cast<int>((position - lower[axis]) * scale[axis]), 0, bins - 1);
