@@ -6,6 +6,7 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_invoke.h>
 #include <tbb/parallel_reduce.h>
+#include <tbb/task_arena.h>
 
 #include <algorithm>
 
@@ -71,7 +72,9 @@ class TopSplitter {
     range.lower = std::make_unique<TopRange>();
     range.upper = std::make_unique<TopRange>();
     TopRange &lower = *range.lower, &upper = *range.upper;
-    divide(range, lower, upper);
+    // While it waits, this thread is not to begin with other ranges, which would keep those below
+    // this one waiting.
+    tbb::this_task_arena::isolate([&] { divide(range, lower, upper); });
     lower.first = range.first;
     upper.first = range.first + lower.count;
     upper.count = range.count - lower.count;
