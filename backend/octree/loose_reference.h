@@ -1,4 +1,4 @@
-// What the references in place of leaf triangles are made of.
+// Passes over a scene's triangles, and the references in place of leaf triangles made in them.
 #pragma once
 
 #include <vector>

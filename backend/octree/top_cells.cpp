@@ -1,9 +1,10 @@
-// Two passes over the triangles: the first joins their boxes cell by cell, the second writes each
-// reference to the range that its cell has come to. Ranges have their references in the order of
-// the triangles, and joining boxes does not depend on any order once zeros have one sign: so
-// nothing depends on how the passes are shared out.
+// Three passes over the triangles: for the bounds of their centres; to join their boxes cell by
+// cell; and, once the cells are split, to write each reference to the range that its cell has come
+// to. Ranges have their references in the order of the triangles, and joining boxes does not depend
+// on any order once zeros have one sign: so nothing depends on how the passes are shared out.
 #include "backend/octree/top_cells.h"
 
+#include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_invoke.h>
 #include <tbb/task_arena.h>
@@ -11,6 +12,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
+#include <limits>
+#include <memory>
 #include <span>
 #include <utility>
 #include <vector>
@@ -32,9 +36,11 @@ class Grid {
   // Over the centres, of at most so many cells.
   Grid(const Bounds8& bounds, std::uint32_t most) {
     float extent[3], longest = 0.0f;
+    bool finite = true;
     for (int axis = 0; axis < 3; ++axis) {
       lower_[axis] = bounds.centres[axis];
       extent[axis] = -bounds.centres[4 + axis] - bounds.centres[axis];
+      finite &= std::isfinite(extent[axis]);
       longest = std::max(longest, extent[axis]);
     }
     int least = 1, beyond = 1024;  // cells along the longest axis
@@ -44,7 +50,7 @@ class Grid {
       (size() <= most ? least : beyond) = across;
     }
     set(extent, longest, least);
-    usable_ = std::isfinite(longest) && std::isfinite(scale_) && longest > 0.0f;
+    usable_ = finite && std::isfinite(scale_) && longest > 0.0f;
   }
 
   bool usable() const { return usable_; }
@@ -137,10 +143,11 @@ std::vector<Share> shares(std::uint32_t count, std::uint32_t number) {
 class CellSplitter {
  public:
   CellSplitter(const BuildInput& input, const TopOptions& options, const Grid& grid,
-               const TopRange& root)
+               const TopRange& root, std::uint32_t unit)
       : input_(input),
         options_(options),
         grid_(grid),
+        unit_(unit),
         root_area_(root.bounds.half_area()),
         threads_(static_cast<std::uint32_t>(tbb::this_task_arena::max_concurrency())) {}
 
@@ -149,8 +156,8 @@ class CellSplitter {
     std::vector<Item> items = occupied();
     std::vector<Leaf> leaves;
     split(root, items, leaves);
-    Cells().swap(cells_);
-    place(root, 0);
+    Cells().swap(cells_);  // before the references' memory is touched
+    set_first(root, 0);
     write(leaves, references);
   }
 
@@ -209,8 +216,9 @@ class CellSplitter {
     for (std::size_t axis = 0; axis < 3; ++axis) {
       across = std::max(across, greatest[axis] - least[axis] + 1);
     }
-    const std::size_t middle =
-        across < options_.least_cells ? 0 : divide(range, items, least, across);
+    const std::size_t middle = across < options_.least_cells || range.count <= unit_
+                                   ? 0
+                                   : divide(range, items, least, across);
     if (middle == 0) {
       leaves.push_back({&range, items});
       return;
@@ -249,29 +257,22 @@ class CellSplitter {
         items.begin(), items.end(), [&](const Item& item) { return bin(item, axis) < chosen.bin; });
     range.lower = std::make_unique<TopRange>();
     range.upper = std::make_unique<TopRange>();
-    sum({items.begin(), middle}, *range.lower);
-    sum({middle, items.end()}, *range.upper);
+    for (int i = 0; i < kMaxBins; ++i) {
+      TopRange& side = i < chosen.bin ? *range.lower : *range.upper;
+      side.count += bins.counts[axis][i];
+      for (int word : {0, 1, 2, 4, 5, 6}) {
+        side.bounds.box[word] = std::min(side.bounds.box[word], bins.boxes[axis][i][word]);
+      }
+    }
     hand_down(range);
     return static_cast<std::size_t>(middle - items.begin());
   }
 
-  // The bounds of the centres are found when the references are written.
-  void sum(std::span<const Item> items, TopRange& range) const {
-    Cell all;
-    all.clear();
-    for (const Item& item : items) all.add(cells_[item.cell]);
-    for (int axis = 0; axis < 3; ++axis) {
-      range.bounds.box[axis] = all.lower()[axis];
-      range.bounds.box[4 + axis] = all.negated_upper()[axis];
-    }
-    range.count = all.count();
-  }
-
-  static void place(TopRange& range, std::uint32_t first) {
+  static void set_first(TopRange& range, std::uint32_t first) {
     range.first = first;
     if (range.lower == nullptr) return;
-    place(*range.lower, first);
-    place(*range.upper, first + range.lower->count);
+    set_first(*range.lower, first);
+    set_first(*range.upper, first + range.lower->count);
   }
 
   // Where the next reference of a leaf goes, and the bounds of the centres of those that are there.
@@ -286,7 +287,10 @@ class CellSplitter {
       for (const Item& item : leaves[leaf].items) leaf_of[item.cell] = leaf;
     }
     const auto count = static_cast<std::uint32_t>(cell_of_.size());
-    const std::vector<Share> all = shares(count, threads_ == 1 ? 1 : 4 * threads_);
+    // Cursors take less memory than what they count.
+    const auto most = static_cast<std::uint32_t>(count / (8 * leaves.size()));
+    const std::vector<Share> all =
+        shares(count, threads_ == 1 ? 1 : std::clamp(most, 1u, 4 * threads_));
     std::vector<std::vector<Cursor>> cursors(all.size());
     tbb::parallel_for(std::size_t{0}, all.size(), [&](std::size_t i) {
       cursors[i].resize(leaves.size());
@@ -296,10 +300,10 @@ class CellSplitter {
         ++cursors[i][leaf].next;
       }
     });
-    for (std::size_t leaf = 0; leaf < leaves.size(); ++leaf) {
+    for_leaves(leaves, [&](std::size_t leaf) {
       std::uint32_t first = leaves[leaf].range->first;
       for (auto& of_share : cursors) first += std::exchange(of_share[leaf].next, first);
-    }
+    });
     tbb::parallel_for(std::size_t{0}, all.size(), [&](std::size_t i) {
       for (std::uint32_t t = all[i].first; t < all[i].last; ++t) {
         Cursor& cursor = cursors[i][cell_of_[t]];
@@ -308,7 +312,7 @@ class CellSplitter {
         std::construct_at(references + cursor.next++, loose_reference(input_, t, box));
       }
     });
-    for (std::size_t leaf = 0; leaf < leaves.size(); ++leaf) {
+    for_leaves(leaves, [&](std::size_t leaf) {
       Box centres;
       for (const auto& of_share : cursors) centres.add(of_share[leaf].centres);
       Bounds8& bounds = leaves[leaf].range->bounds;
@@ -316,12 +320,20 @@ class CellSplitter {
         bounds.centres[axis] = centres.lower[axis];
         bounds.centres[4 + axis] = -centres.upper[axis];
       }
-    }
+    });
+  }
+
+  template <class Visit>
+  static void for_leaves(const std::vector<Leaf>& leaves, const Visit& visit) {
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, leaves.size(), 64), [&](const auto& some) {
+      for (std::size_t leaf = some.begin(); leaf < some.end(); ++leaf) visit(leaf);
+    });
   }
 
   const BuildInput& input_;
   const TopOptions& options_;
   const Grid& grid_;
+  const std::uint32_t unit_;
   const float root_area_;
   const std::uint32_t threads_;
   const ObjectSplitter splitter_;
@@ -334,6 +346,7 @@ bool seems_to_overlap(const BuildInput& input, const TopOptions& options) {
   constexpr std::size_t kMost = 8192;
   const std::size_t count = input.triangles.size(), stride = (count + kMost - 1) / kMost;
   std::vector<LooseReference> some;
+  some.reserve(kMost);
   for (std::size_t i = 0; i < count; i += stride) {
     const auto triangle = static_cast<std::uint32_t>(i);
     some.push_back(loose_reference(input, triangle, triangle_box(input, triangle)));
@@ -351,14 +364,16 @@ bool seems_to_overlap(const BuildInput& input, const TopOptions& options) {
 
 }  // namespace
 
-bool split_by_cells(const BuildInput& input, const TopOptions& options, TopRange& root,
-                    LooseReference* references) {
+bool split_by_cells(const BuildInput& input, const TopOptions& options, std::uint32_t unit,
+                    TopRange& root, LooseReference* references) {
+  if (options.sah_depth == 0) return false;
   if (root.room != 0 && seems_to_overlap(input, options)) return false;
   const Bounds8 bounds = for_triangles(input, [](std::uint32_t, const Box&) {});
-  const Grid grid(bounds, std::max(root.count / options.triangles_a_cell, 1u));
+  const Grid grid(bounds,
+                  std::clamp(root.count / options.triangles_a_cell, 1u, options.most_cells));
   if (!grid.usable()) return false;
   root.bounds = bounds;
-  CellSplitter(input, options, grid, root).run(root, references);
+  CellSplitter(input, options, grid, root, unit).run(root, references);
   return true;
 }
 

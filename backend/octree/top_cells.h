@@ -6,11 +6,12 @@
 
 namespace octrace::octree {
 
-// Splits the root, whose count and room are known, as long as its ranges are many cells wide and no
-// cuts are called for; finds its bounds and writes all references, in the order of the ranges. The
-// same for any number of threads. False, and nothing done: of some of the triangles it seems that
-// cuts are called for at once; or centres cannot be told apart, or are infinite.
-bool split_by_cells(const BuildInput& input, const TopOptions& options, TopRange& root,
-                    LooseReference* references);
+// Splits the root, whose count and room are known, into ranges that are few cells wide, or have no
+// more triangles than a unit, or call for cuts; finds their bounds, of the centres only where a
+// range is not split, and writes all references, in the order of the ranges. The same for any
+// number of threads. False, and nothing done: of some of the triangles it seems that cuts are
+// called for at once; or the distance of the farthest centres is none, infinite, or has no inverse.
+bool split_by_cells(const BuildInput& input, const TopOptions& options, std::uint32_t unit,
+                    TopRange& root, LooseReference* references);
 
 }  // namespace octrace::octree

@@ -54,7 +54,7 @@ class TopSplitter {
  private:
   void make_references(TopRange& root) {
     if (root.count >= options_.least_for_cells &&
-        split_by_cells(input_, options_, root, references_)) {
+        split_by_cells(input_, options_, unit_, root, references_)) {
       return;
     }
     root.bounds = for_triangles(input_, [&](std::uint32_t i, const Box& box) {

@@ -18,10 +18,12 @@ inline constexpr std::uint32_t kMostInUnit = 1024;
 inline constexpr std::uint32_t kMostInSubtree = 8192;
 
 struct TopOptions {
-  // Scenes of so many triangles are first split by the cells of a grid (top_cells.h), one for so
-  // many triangles, down to ranges of fewer cells along their longest axis than these.
+  // Scenes of so many triangles are first split by the cells of a grid (top_cells.h), at most one
+  // for so many triangles and so many in all, lest they leave a core's cache; down to ranges of
+  // fewer cells along their longest axis than these.
   std::uint32_t least_for_cells = 1u << 17;
   std::uint32_t triangles_a_cell = 8;
+  std::uint32_t most_cells = 1u << 17;
   int least_cells = 8;
   int bins = 32;       // of ranges above units
   int unit_bins = 16;  // and in them
@@ -48,7 +50,7 @@ struct TopRange {
   std::uint32_t first = 0, count = 0;
   Parts parts;
   int depth = 0;
-  Bounds8 bounds;
+  Bounds8 bounds;                          // of the centres until the range is split
   std::uint32_t room = 0;                  // how many parts more cuts may make
   int misses = 0;                          // nodes in line above where a cut was of no use
   std::uint32_t place = 0, size = 0;       // where its references are among those of all units
