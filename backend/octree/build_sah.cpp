@@ -1,7 +1,7 @@
-// The SAH builders. `sah`: the top of a binary tree with cuts (top_tree.h), subtrees in cache below
-// (build_subtrees.h), with re-insertion (reinsert.h) of what is large. `quality`: a whole binary
-// tree with more cuts (build_binary.h), more of it re-inserted, collapsed into eight-way nodes
-// (collapse.h).
+// The SAH builders. `sah`: the top of a binary tree with cuts (top_tree.h, top_cells.h), subtrees
+// in cache below (build_subtrees.h), with re-insertion (reinsert.h) of what is large. `quality`: a
+// whole binary tree with more cuts (build_binary.h), more of it re-inserted, collapsed into
+// eight-way nodes (collapse.h).
 #include <algorithm>
 #include <stdexcept>
 

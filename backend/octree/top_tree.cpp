@@ -1,6 +1,7 @@
 // The same ranges for any number of threads: bins are filled by minima and integer sums, which do
 // not depend on order; bounds are joined in the order of fixed blocks; and the k-th reference that
-// is misplaced on one side of a split changes places with the k-th of the other side.
+// is misplaced on one side of a split changes places with the k-th of the other side. Of large
+// scenes, top_cells.cpp makes the topmost splits before.
 #include "backend/octree/top_tree.h"
 
 #include <tbb/blocked_range.h>
