@@ -35,7 +35,7 @@ ReinsertOptions reinsert_options(const BinaryTree& tree) {
   options.rounds = 10;
   const std::uint32_t references = tree.nodes[BinaryTree::kRoot].plan;
   options.most = std::max(references / 5, 1u);  // a tenth of the nodes
-  options.steps = 256;
+  options.steps = kReinsertSteps;
   return options;
 }
 

@@ -52,14 +52,30 @@ HWY_ATTR std::uint32_t find_misplaced(LooseReference* references, std::uint32_t 
   return found;
 }
 
+// The two axes that SpatialBinning::leave_out_shortest() leaves.
+struct Axes {
+  int axis[2];
+
+  explicit Axes(const SpatialBinning& binning) {
+    int left_out = 0;
+    for (int i = 1; i < 3; ++i) {
+      if (binning.extent[i] <= binning.extent[left_out]) left_out = i;
+    }
+    axis[0] = left_out == 0 ? 1 : 0;
+    axis[1] = left_out == 2 ? 1 : 2;
+  }
+  const int* begin() const { return axis; }
+  const int* end() const { return axis + 2; }
+};
+
 // For each plane between two bins, what the box of what lies below or above it may not pass: a
 // Box8, the greater of which and of a box is the box cut there.
 struct Clips {
   alignas(32) float below[3][kMaxBins][8];  // [axis][i]: the plane between bins i and i + 1
   alignas(32) float above[3][kMaxBins][8];
 
-  explicit Clips(const SpatialBinning& binning) {
-    for (int axis = 0; axis < 3; ++axis) {
+  Clips(const SpatialBinning& binning, const Axes& axes) {
+    for (const int axis : axes) {
       for (int bin = 0; bin + 1 < binning.bins; ++bin) {
         std::fill_n(below[axis][bin], 8, -std::numeric_limits<float>::infinity());
         std::fill_n(above[axis][bin], 8, -std::numeric_limits<float>::infinity());
@@ -78,10 +94,10 @@ HWY_ATTR HWY_INLINE void join(const Box8& box, Bounds8& bin) {
 // A box that lies in several bins along an axis.
 HWY_ATTR HWY_NOINLINE void fill_across(const BuildInput& input, const LooseReference& reference,
                                        const std::int32_t* first, const std::int32_t* last,
-                                       const SpatialBinning& binning, const Clips& clips,
-                                       SpatialBins& bins) {
+                                       const SpatialBinning& binning, const Axes& axes,
+                                       const Clips& clips, SpatialBins& bins) {
   const bool cuts = may_cut(input, reference.corners.geometry);
-  for (const int axis : binning.axes) {
+  for (const int axis : axes) {
     std::int32_t bin = first[axis], end = last[axis];
     if (!cuts) bin = end = binning.bin(0.5f * reference.centre2(axis), axis);
     ++bins.enter[axis][bin];
@@ -101,13 +117,14 @@ HWY_ATTR void fill_space(const BuildInput& input, const LooseReference* referenc
   constexpr std::uint32_t kFew = 32;
   alignas(16) std::int32_t first[kFew][4], last[kFew][4];
   std::uint32_t within[3][kMaxBins] = {};  // boxes in one bin
-  const Clips clips(binning);
+  const Axes axes(binning);
+  const Clips clips(binning, axes);
 #if HWY_TARGET != HWY_SCALAR
   const hn::RebindToSigned<decltype(kHalfTag)> di;
   const auto low = hn::LoadU(kHalfTag, binning.lower);
   const auto scale = hn::LoadU(kHalfTag, binning.scale);
   const auto zero = hn::Zero(di), most = hn::Set(di, binning.bins - 1);
-  const auto axes = hn::FirstN(kHalfTag, 3);  // as in fill_bins()
+  const auto words = hn::FirstN(kHalfTag, 3);  // as in fill_bins()
 #endif
   for (std::uint32_t start = 0; start < count; start += kFew) {
     const LooseReference* from = references + start;
@@ -117,9 +134,9 @@ HWY_ATTR void fill_space(const BuildInput& input, const LooseReference* referenc
       const auto lower = hn::Load(kHalfTag, from[i].lower);
       const auto upper = hn::Neg(hn::Load(kHalfTag, from[i].negated_upper));
       const auto begin =
-          hn::ConvertTo(di, hn::Mul(hn::IfThenElseZero(axes, hn::Sub(lower, low)), scale));
+          hn::ConvertTo(di, hn::Mul(hn::IfThenElseZero(words, hn::Sub(lower, low)), scale));
       const auto end =
-          hn::ConvertTo(di, hn::Mul(hn::IfThenElseZero(axes, hn::Sub(upper, low)), scale));
+          hn::ConvertTo(di, hn::Mul(hn::IfThenElseZero(words, hn::Sub(upper, low)), scale));
       hn::Store(hn::Min(hn::Max(begin, zero), most), di, first[i]);
       hn::Store(hn::Min(hn::Max(end, zero), most), di, last[i]);
 #else
@@ -132,17 +149,17 @@ HWY_ATTR void fill_space(const BuildInput& input, const LooseReference* referenc
     for (std::uint32_t i = 0; i < few; ++i) {
       const std::int32_t *begin = first[i], *end = last[i];
       if (((begin[0] ^ end[0]) | (begin[1] ^ end[1]) | (begin[2] ^ end[2])) != 0) {
-        fill_across(input, from[i], begin, end, binning, clips, bins);
+        fill_across(input, from[i], begin, end, binning, axes, clips, bins);
         continue;
       }
       const Box8 box = load(from[i]);
-      for (const int axis : binning.axes) {
+      for (const int axis : axes) {
         join(box, bins.parts[axis][begin[axis]]);
         ++within[axis][begin[axis]];
       }
     }
   }
-  for (const int axis : binning.axes) {
+  for (const int axis : axes) {
     for (int bin = 0; bin < binning.bins; ++bin) {
       bins.enter[axis][bin] += within[axis][bin];
       bins.leave[axis][bin] += within[axis][bin];

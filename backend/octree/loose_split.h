@@ -16,7 +16,8 @@ struct LooseSplitter {
   // bounds of the lower and the upper side what belongs there.
   std::uint32_t (*find_misplaced)(LooseReference*, std::uint32_t count, bool on_upper_side,
                                   const SidePlane&, Bounds8 (&bounds)[2]);
-  // Bins of space along two axes. Triangles that lie in several are cut there as their boxes are.
+  // Bins of space along the two axes that leave_out_shortest() leaves. Triangles that lie in
+  // several are cut there as their boxes are.
   void (*fill_space)(const BuildInput&, const LooseReference*, std::uint32_t count,
                      const SpatialBinning&, SpatialBins&);
   void (*pack)(const LooseReference*, std::uint32_t count, Reference* to);

@@ -144,8 +144,6 @@ void SpatialBinning::leave_out_shortest() {
     if (extent[axis] <= extent[shortest]) shortest = axis;
   }
   extent[shortest] = scale[shortest] = 0.0f;
-  axes[0] = shortest == 0 ? 1 : 0;
-  axes[1] = shortest == 2 ? 1 : 2;
 }
 
 float SpatialBinning::plane(int axis, int bin) const {

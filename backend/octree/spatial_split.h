@@ -23,10 +23,9 @@ struct SpatialBinning {
   float scale[4];
   int bins;
 
-  int axes[2] = {0, 1};  // those that leave_out_shortest() leaves
-
   SpatialBinning(const Bounds8& bounds, int bin_count);
-  // Cuts across the shortest side are hardly ever the cheapest.
+  // No planes across the shortest side, which `sah` does without: in sponza no cut of a large range
+  // was cheapest there (docs/performance.md).
   void leave_out_shortest();
   float plane(int axis, int bin) const;  // the lower end of the bin
   int bin(float position, int axis) const {

@@ -1,7 +1,8 @@
 // Three passes over the triangles: for the bounds of their centres; to join their boxes cell by
 // cell; and, once the cells are split, to write each reference to the range that its cell has come
-// to. Ranges have their references in the order of the triangles, and joining boxes does not depend
-// on any order once zeros have one sign: so nothing depends on how the passes are shared out.
+// to. Ranges have their references in the order of the triangles; of equal zeros the last in that
+// order counts, or, in boxes of cells, whose order std::partition() leaves open, all have one sign:
+// so nothing depends on how the passes are shared out.
 #include "backend/octree/top_cells.h"
 
 #include <tbb/blocked_range.h>
@@ -189,7 +190,7 @@ class CellSplitter {
       const Box box = triangle_box(input_, i);
       const std::uint32_t cell = grid_.cell(box.centre2());
       cell_of_[i] = cell;
-      // The sign of a zero would be that of whichever triangle came last.
+      // Zeros of one sign, whatever the order in which cells are joined.
       constexpr Float4 kZero{};
       cells[cell].add(kZero + box.lower, kZero - box.upper, 1);
     }
@@ -287,7 +288,7 @@ class CellSplitter {
       for (const Item& item : leaves[leaf].items) leaf_of[item.cell] = leaf;
     }
     const auto count = static_cast<std::uint32_t>(cell_of_.size());
-    // Cursors take less memory than what they count.
+    // At most 6 bytes a triangle of cursors.
     const auto most = static_cast<std::uint32_t>(count / (8 * leaves.size()));
     const std::vector<Share> all =
         shares(count, threads_ == 1 ? 1 : std::clamp(most, 1u, 4 * threads_));

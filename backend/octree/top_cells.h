@@ -10,7 +10,8 @@ namespace octrace::octree {
 // more triangles than a unit, or call for cuts; finds their bounds, of the centres only where a
 // range is not split, and writes all references, in the order of the ranges. The same for any
 // number of threads. False, and nothing done: of some of the triangles it seems that cuts are
-// called for at once; or the distance of the farthest centres is none, infinite, or has no inverse.
+// called for at once; the farthest centres are at no distance, or at one that is infinite or has no
+// inverse; or the octree is to be of halves by rank.
 bool split_by_cells(const BuildInput& input, const TopOptions& options, std::uint32_t unit,
                     TopRange& root, LooseReference* references);
 

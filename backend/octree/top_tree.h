@@ -17,10 +17,14 @@ inline constexpr std::uint32_t kMostInUnit = 1024;
 // reference, are to stay in a core's cache while they are worked on.
 inline constexpr std::uint32_t kMostInSubtree = 8192;
 
+// Nodes that one search of a re-insertion looks at: more make no better trees of real scenes, and
+// take long where triangles are as large as the scene.
+inline constexpr std::uint32_t kReinsertSteps = 256;
+
 struct TopOptions {
   // Scenes of so many triangles are first split by the cells of a grid (top_cells.h), at most one
-  // for so many triangles and so many in all, lest they leave a core's cache; down to ranges of
-  // fewer cells along their longest axis than these.
+  // for so many triangles and so many in all, lest they leave the caches; as long as ranges are so
+  // many cells wide along their longest axis.
   std::uint32_t least_for_cells = 1u << 17;
   std::uint32_t triangles_a_cell = 8;
   std::uint32_t most_cells = 1u << 17;
@@ -41,7 +45,7 @@ struct TopOptions {
   float reinsert_area = 0.003f;
   std::uint32_t reinsert_most = 256;  // in a subtree
   std::uint32_t reinsert_most_above = 4096;
-  std::uint32_t reinsert_steps = 256;  // of one search
+  std::uint32_t reinsert_steps = kReinsertSteps;
 };
 
 struct TopRange {

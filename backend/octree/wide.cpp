@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <cmath>
 #include <cstring>
 #include <limits>
 #include <memory>
@@ -31,7 +30,8 @@ constexpr std::uint32_t leaf_units(std::uint32_t triangles) {
   return (triangles * kBytes + sizeof(WideUnit) - 1) / sizeof(WideUnit);
 }
 
-// As std::nextafter() towards minus infinity, which is a call, of what is no NaN.
+// As std::nextafter() towards minus infinity, which is a call, of what is neither NaN nor
+// -infinity.
 float next_below(float value) {
   if (value == 0.0f) return -std::numeric_limits<float>::denorm_min();
   const auto bits = std::bit_cast<std::uint32_t>(value);
@@ -159,7 +159,7 @@ class Widener {
     box.add(float4(t.c));
     const Float4 extent = box.upper - box.lower;
     const float side = std::max<float>({extent[0], extent[1], extent[2]});
-    const Float4 margin = Float4{} + side * 0x1p-18f;
+    const float margin = side * 0x1p-18f;
     box.lower -= margin;
     box.upper += margin;
     return box;

@@ -60,6 +60,7 @@ struct Split {
       ranges.push_back(&range);
       return;
     }
+    EXPECT_GT(range.count, kUnit);
     EXPECT_EQ(range.lower->first, range.first);
     EXPECT_EQ(range.upper->first, range.first + range.lower->count);
     EXPECT_EQ(range.count, range.lower->count + range.upper->count);
@@ -84,8 +85,12 @@ struct OctreeCells : testing::TestWithParam<std::size_t> {
 
 TEST_P(OctreeCells, RangesHoldAllReferences) {
   const octree::BuildInput input = mesh.input();
-  for (const int sah_depth : {64, 64 + 1, 3}) {
-    octree::TopOptions options = with_cells(sah_depth == 64 ? 8 : 1);
+  struct Case {
+    int sah_depth;
+    std::uint32_t triangles_a_cell;
+  };
+  for (const auto& [sah_depth, triangles_a_cell] : {Case{64, 8}, Case{64, 1}, Case{3, 1}}) {
+    octree::TopOptions options = with_cells(triangles_a_cell);
     options.sah_depth = sah_depth;
     options.duplicates = 0.0f;  // or some are to be cut at once
     std::vector<octree::LooseReference> expected;
@@ -95,6 +100,9 @@ TEST_P(OctreeCells, RangesHoldAllReferences) {
       ASSERT_EQ(split.done, name != "denormals" && name != "one_place" && name != "one_point");
       if (!split.done) return;
       EXPECT_EQ(split.ranges.size() > 1, split.root.count > kUnit);
+      if (name.starts_with("dust") && sah_depth == 64) {
+        EXPECT_GE(split.ranges.size(), split.root.count / kUnit);
+      }
       std::uint32_t next = 0;
       for (const octree::TopRange* range : split.ranges) {
         ASSERT_EQ(range->first, next);
@@ -264,6 +272,16 @@ TEST(OctreeCellsOfARoom, AreNotMade) {
     options.sah_depth = 0;
     EXPECT_FALSE(Split(mesh.input(), options, 2).done);
   }
+}
+
+TEST(OctreeCellsOfDust, AreNoMoreThanAskedFor) {
+  const Mesh mesh = make_dust(100000);
+  octree::TopOptions options = with_cells(8);
+  options.most_cells = 64;
+  const Split split(mesh.input(), options, 3);
+  ASSERT_TRUE(split.done);
+  EXPECT_GT(split.ranges.size(), 8u);
+  EXPECT_LE(split.ranges.size(), 64u);
 }
 
 // Sums of corners that overflow.
