@@ -57,10 +57,7 @@ struct Axes {
   int axis[2];
 
   explicit Axes(const SpatialBinning& binning) {
-    int left_out = 0;
-    for (int i = 1; i < 3; ++i) {
-      if (binning.extent[i] <= binning.extent[left_out]) left_out = i;
-    }
+    const int left_out = binning.shortest();
     axis[0] = left_out == 0 ? 1 : 0;
     axis[1] = left_out == 2 ? 1 : 2;
   }

@@ -138,12 +138,17 @@ SpatialBinning::SpatialBinning(const Bounds8& bounds, int bin_count) : bins(bin_
   lower[3] = scale[3] = 0.0f;
 }
 
-void SpatialBinning::leave_out_shortest() {
-  int shortest = 0;
+int SpatialBinning::shortest() const {
+  int found = 0;
   for (int axis = 1; axis < 3; ++axis) {
-    if (extent[axis] <= extent[shortest]) shortest = axis;
+    if (extent[axis] <= extent[found]) found = axis;
   }
-  extent[shortest] = scale[shortest] = 0.0f;
+  return found;
+}
+
+void SpatialBinning::leave_out_shortest() {
+  const int axis = shortest();
+  extent[axis] = scale[axis] = 0.0f;
 }
 
 float SpatialBinning::plane(int axis, int bin) const {

@@ -24,6 +24,7 @@ struct SpatialBinning {
   int bins;
 
   SpatialBinning(const Bounds8& bounds, int bin_count);
+  int shortest() const;  // the axis of the least extent
   // No planes across the shortest side, which `sah` does without: in sponza no cut of a large range
   // was cheapest there (docs/performance.md).
   void leave_out_shortest();

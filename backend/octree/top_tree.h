@@ -54,7 +54,7 @@ struct TopRange {
   std::uint32_t first = 0, count = 0;
   Parts parts;
   int depth = 0;
-  Bounds8 bounds;                          // of the centres until the range is split
+  Bounds8 bounds;                          // of the centres, only while it is not split
   std::uint32_t room = 0;                  // how many parts more cuts may make
   int misses = 0;                          // nodes in line above where a cut was of no use
   std::uint32_t place = 0, size = 0;       // where its references are among those of all units

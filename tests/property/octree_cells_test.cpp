@@ -15,8 +15,7 @@
 
 #include "backend/octree/build_subtrees.h"
 #include "backend/octree/builders.h"
-#include "kernels/cpu/intersect.h"
-#include "tests/support/brute_force.h"
+#include "tests/support/expect_brute_force.h"
 #include "tests/support/intensity.h"
 #include "tests/support/large_meshes.h"
 
@@ -160,24 +159,6 @@ bool same(const octree::Octree& a, const octree::Octree& b) {
                      a.triangles.size() * sizeof a.triangles[0]) == 0;
 }
 
-void expect_brute_force(const Mesh& mesh, const octree::Octree& octree) {
-  const kernels::CpuTracer tracer;
-  kernels::SceneView view;
-  view.octree = octree.view();
-  std::mt19937_64 random(seed());
-  for (std::uint64_t i = 0; i < scaled(200); ++i) {
-    const kernels::Ray ray = random_ray(mesh, octree, random);
-    const kernels::Hit expected = brute_force(mesh.positions, mesh.triangles, ray);
-    kernels::Hit found;
-    ASSERT_EQ(kernels::TraceStatus::ok, tracer.closest(view, {}, ray, &found));
-    ASSERT_EQ(found.triangle, expected.triangle)
-        << mesh.name << ", seed " << seed() << ", ray " << i;
-    if (expected.valid()) {
-      ASSERT_EQ(0, std::memcmp(&found.t, &expected.t, sizeof(float)));
-    }
-  }
-}
-
 // The chain is too deep for any tree of splits (octree_subtrees_test.cpp).
 TEST_P(OctreeCells, OctreesAreSoundAndTheSameForAnyThreadCount) {
   if (name == "chain") return;
@@ -190,7 +171,7 @@ TEST_P(OctreeCells, OctreesAreSoundAndTheSameForAnyThreadCount) {
     }
     const util::Result<void> ok = octree::verify(octree, mesh.input());
     EXPECT_TRUE(ok) << ok.error().to_string();
-    expect_brute_force(mesh, octree);
+    expect_brute_force(mesh, {&octree, 1}, scaled(200));
     expected = std::move(octree);
   }
 }

@@ -14,8 +14,7 @@
 #include "backend/octree/build_subtrees.h"
 #include "backend/octree/builders.h"
 #include "backend/octree/top_tree.h"
-#include "kernels/cpu/intersect.h"
-#include "tests/support/brute_force.h"
+#include "tests/support/expect_brute_force.h"
 #include "tests/support/intensity.h"
 #include "tests/support/large_meshes.h"
 
@@ -248,23 +247,7 @@ TEST_P(OctreeSubtrees, AreSoundAndTheSameForAnyThreadCount) {
 
 TEST_P(OctreeSubtrees, HitWhatBruteForceHits) {
   const octree::Octree octrees[] = {build(mesh, false), build(mesh, true)};
-  const kernels::CpuTracer tracer;
-  std::mt19937_64 random(seed());
-  for (std::uint64_t i = 0; i < scaled(500); ++i) {
-    const kernels::Ray ray = random_ray(mesh, octrees[i % 2], random);
-    const kernels::Hit expected = brute_force(mesh.positions, mesh.triangles, ray);
-    for (const octree::Octree& octree : octrees) {
-      kernels::SceneView view;
-      view.octree = octree.view();
-      kernels::Hit found;
-      ASSERT_EQ(kernels::TraceStatus::ok, tracer.closest(view, {}, ray, &found));
-      ASSERT_EQ(found.triangle, expected.triangle)
-          << mesh.name << ", seed " << seed() << ", ray " << i;
-      if (expected.valid()) {
-        ASSERT_EQ(0, std::memcmp(&found.t, &expected.t, sizeof(float)));
-      }
-    }
-  }
+  expect_brute_force(mesh, octrees, scaled(500));
 }
 
 // A ray is dimmed once by a BLEND triangle, so it must lie in one leaf.
